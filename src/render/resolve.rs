@@ -1,0 +1,35 @@
+//! Solving again from the buffers of a file: another norm, another alpha, no rendering.
+
+use super::job::{Format, Output};
+use super::metadata;
+use crate::error::Result;
+use crate::reconstruct::Method;
+use crate::store::png::{self, ToneMap};
+use crate::store::{atomic, exr, layers};
+use std::path::Path;
+
+/// Reads the buffers of `input`, solves, and writes the outputs with the layers and the metadata of the input.
+/// Returns the relative residual of the solve.
+pub fn run(
+    input: &Path,
+    outputs: &[Output],
+    method: Method,
+    alpha: f32,
+    (exposure, tone_map): (f32, ToneMap),
+) -> Result<Option<f64>> {
+    for output in outputs {
+        atomic::probe(&output.path, &[input])?;
+    }
+    let mut document = exr::read_file(input)?;
+    let buffers = layers::buffers(&document, input)?;
+    let solution = super::solve_planes(&buffers.primal, &buffers.dx, &buffers.dy, &buffers.direct, method, alpha);
+    layers::set_image(&mut document, &solution.image);
+    metadata::set_solve(&mut document, method, alpha, solution.residual);
+    for output in outputs {
+        match output.format {
+            Format::Exr => exr::write(&output.path, &document)?,
+            Format::Png => png::write(&output.path, &solution.image, exposure, tone_map)?,
+        }
+    }
+    Ok(solution.residual)
+}
