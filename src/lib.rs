@@ -7,8 +7,13 @@
 #![forbid(unsafe_code)]
 
 pub mod accel;
+pub mod analyze;
+pub mod cli;
 pub mod error;
 pub mod film;
+pub mod integrate;
 pub mod math;
+pub mod reconstruct;
+pub mod render;
 pub mod scene;
 pub mod store;

@@ -6,15 +6,15 @@ pub mod metadata;
 mod prepare;
 pub mod resolve;
 
-use self::prepare::{check_memory, load};
-pub use self::prepare::open;
 pub use self::job::{Backend, CameraChoice, EnvironmentOptions, Format, Job, Lens, Output, Source};
+pub use self::prepare::open;
+use self::prepare::{check_memory, load};
 
 use crate::accel::{Accel, EmbreeAccel, ObvhsAccel};
 use crate::error::{Error, Result};
 use crate::film::{Film, Half, Plane};
 use crate::integrate::{self, Statistics};
-use crate::reconstruct::{self, Method};
+use crate::reconstruct::{Input, Method, reconstruct};
 use crate::scene::{Camera, LoadReport, Scene};
 use crate::store::{Window, atomic, exr, layers, png};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -72,6 +72,8 @@ pub struct Report {
     pub error_estimate: Option<f64>,
     /// Relative residual of the solve; `None` without one.
     pub residual: Option<f64>,
+    /// Measurements the solve did without because they were not finite.
+    pub missing: usize,
     /// Threads that worked.
     pub threads: usize,
 }
@@ -120,9 +122,6 @@ fn run_in_pool(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<
     let (written, time) = timed(|| write(job, &film, &camera, &solution));
     written?;
     seconds.write = time;
-    if job.strict && film.dropped_samples > 0 {
-        return Err(prepare::strict(job, &format!("{} samples dropped", film.dropped_samples)));
-    }
 
     Ok(Report {
         seconds,
@@ -133,6 +132,7 @@ fn run_in_pool(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<
         samples: film.width as u64 * film.height as u64 * u64::from(film.samples(Half::Both)),
         error_estimate: error_estimate(&film),
         residual: solution.residual,
+        missing: solution.missing,
         threads,
     })
 }
@@ -146,6 +146,16 @@ fn timed<T>(f: impl FnOnce() -> T) -> (T, f64) {
 
 fn go_on(cancel: &AtomicBool) -> Result<()> {
     if cancel.load(Ordering::Relaxed) { Err(Error::Interrupted(0)) } else { Ok(()) }
+}
+
+/// Fails where the job is strict and its render left something out; the images are written nevertheless.
+pub fn check_strict(job: &Job, report: &Report) -> Result<()> {
+    let dropped = report.statistics.dropped_samples;
+    if job.strict && (dropped > 0 || report.missing > 0) {
+        let what = format!("{dropped} samples dropped, {} measurements missing", report.missing);
+        return Err(prepare::strict(job, &what));
+    }
+    Ok(())
 }
 
 /// Builds one backend and integrates with it: the one place that knows which.
@@ -165,8 +175,7 @@ fn integrate_with<A: Accel>(
 
     monitor.stage("render");
     let on_progress = |done, total| monitor.progress(done, total);
-    let (result, time) =
-        timed(|| integrate::run(scene, &accel, camera, &job.settings, &on_progress, cancel));
+    let (result, time) = timed(|| integrate::run(scene, &accel, camera, &job.settings, &on_progress, cancel));
     seconds.render = time;
     go_on(cancel)?;
     Ok(result)
@@ -179,6 +188,8 @@ pub struct Solved {
     pub image: Plane,
     /// Relative residual; `None` where nothing was solved.
     pub residual: Option<f64>,
+    /// Measurements that were not finite and had no say.
+    pub missing: usize,
 }
 
 /// The image of a film: solved for, or primal plus very direct light.
@@ -187,7 +198,7 @@ fn solve(film: &Film, method: Method, alpha: f32) -> Solved {
     if film.has_gradients {
         solve_planes(&film.primal(both), &film.dx(both), &film.dy(both), &film.direct(), method, alpha)
     } else {
-        Solved { image: sum(&film.primal(both), &film.direct()), residual: None }
+        Solved { image: sum(&film.primal(both), &film.direct()), residual: None, missing: 0 }
     }
 }
 
@@ -201,10 +212,14 @@ fn solve_planes(
     alpha: f32,
 ) -> Solved {
     if method == Method::None {
-        return Solved { image: sum(primal, direct), residual: None };
+        return Solved { image: sum(primal, direct), residual: None, missing: 0 };
     }
-    let solution = reconstruct::solve(primal, dx, dy, alpha, method);
-    Solved { image: sum(&solution.image, direct), residual: Some(solution.residual) }
+    let solution = reconstruct(&Input { primal, dx, dy }, method, alpha);
+    Solved {
+        image: sum(&solution.image, direct),
+        residual: Some(solution.residual),
+        missing: solution.missing,
+    }
 }
 
 fn sum(a: &Plane, b: &Plane) -> Plane {
@@ -226,11 +241,10 @@ fn write(job: &Job, film: &Film, camera: &Camera, solved: &Solved) -> Result<()>
             Format::Exr => {
                 let mut document = layers::document(film, &solved.image, &job.layers, job.buffers);
                 let settings = &job.settings;
-                document.window = settings.crop.map(|[x0, y0, ..]| Window {
-                    full: [settings.width, settings.height],
-                    origin: [x0, y0],
-                });
-                layers::set_camera(&mut document, camera, settings.width, settings.height);
+                document.window = settings
+                    .crop
+                    .map(|[x0, y0, ..]| Window { full: [settings.width, settings.height], origin: [x0, y0] });
+                metadata::set_camera(&mut document, camera, settings.width, settings.height);
                 metadata::set_job(&mut document, job)?;
                 metadata::set_solve(&mut document, job.method, job.alpha, solved.residual);
                 exr::write(&output.path, &document)?;

@@ -156,8 +156,8 @@ pub struct RenderFlags {
     /// Weight of the samples against the gradients in the reconstruction
     #[arg(long, value_name = "X", default_value_t = 0.2, value_parser = positive)]
     alpha: f32,
-    /// Roughness (0 to 1) below which a bounce is shifted as a mirror's
-    #[arg(long, value_name = "ROUGHNESS", default_value_t = 0.2, value_parser = fraction)]
+    /// Roughness (GGX alpha) up to which a bounce is shifted as a mirror's
+    #[arg(long, value_name = "ROUGHNESS", default_value_t = 0.001, value_parser = fraction)]
     shift_threshold: f32,
     /// Weights between a path and its shifted twin; off shows what happens without
     #[arg(long, value_name = "ON|OFF", default_value = "on")]

@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashSet;
 use std::io::IsTerminal;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// `--progress`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -17,9 +17,9 @@ pub enum Style {
     Auto,
     /// A bar with the time left
     Bar,
-    /// A line every ten per cent
+    /// A line every ten per cent, one a second at most
     Plain,
-    /// A JSON object a line
+    /// A JSON object a second: stage, done, total, seconds, seconds_left
     Json,
     /// Nothing
     None,
@@ -36,6 +36,7 @@ pub struct Progress {
 struct State {
     stage: String,
     begin: Instant,
+    last: Instant,
     tenths: u64,
     said: HashSet<String>,
 }
@@ -54,8 +55,13 @@ impl Progress {
         let bar = ProgressBar::with_draw_target(Some(0), target);
         let template = "{msg:>11} [{bar:40}] {percent:>3} %  {elapsed} passed, {eta} left";
         bar.set_style(ProgressStyle::with_template(template).expect("the template is a constant"));
-        let state =
-            State { stage: String::new(), begin: Instant::now(), tenths: 0, said: HashSet::new() };
+        let state = State {
+            stage: String::new(),
+            begin: Instant::now(),
+            last: Instant::now(),
+            tenths: 0,
+            said: HashSet::new(),
+        };
         Self { style, quiet, bar, state: Mutex::new(state) }
     }
 
@@ -68,14 +74,17 @@ impl Progress {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Says that `done` of `total` is done, where a further tenth of it is.
+    /// Says that `done` of `total` is done: in JSON once a second, in plain text where a further tenth is done and a
+    /// second has passed.
     fn say(&self, done: u64, total: u64) {
         let mut state = self.state();
         let tenths = 10 * done / total.max(1);
-        if tenths <= state.tenths {
+        let is_news = self.style == Style::Json || tenths > state.tenths;
+        if !is_news || state.last.elapsed() < Duration::from_secs(1) {
             return;
         }
         state.tenths = tenths;
+        state.last = Instant::now();
         let passed = state.begin.elapsed().as_secs_f64();
         let left = passed * (total - done.min(total)) as f64 / done.max(1) as f64;
         terminal::line(&match self.style {
@@ -83,7 +92,7 @@ impl Progress {
                 "stage": state.stage, "done": done, "total": total, "seconds": passed, "seconds_left": left,
             })
             .to_string(),
-            _ => format!("gdpt: {} {} %, {passed:.1} s passed, {left:.1} s left", state.stage, 10 * tenths),
+            _ => format!("gdpt: {} {} %, {passed:.0} s passed, {left:.0} s left", state.stage, 10 * tenths),
         });
     }
 }
@@ -99,6 +108,7 @@ impl Monitor for Progress {
         let mut state = self.state();
         state.stage = name.to_owned();
         state.begin = Instant::now();
+        state.last = state.begin;
         state.tenths = 0;
         self.bar.set_message(name.to_owned());
         self.bar.set_position(0);

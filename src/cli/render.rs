@@ -64,7 +64,7 @@ fn summary(job: &Job, report: &Report, verbose: bool) -> String {
         (report.load.dropped_triangles, "triangles dropped"),
         (report.load.missing_textures, "textures missing"),
         (report.statistics.dropped_samples, "samples dropped"),
-        (report.unsolved_pixels, "pixels without a solution"),
+        (report.missing as u64, "measurements missing"),
     ];
     for (count, what) in dropped.iter().filter(|d| d.0 > 0) {
         row(what, count.to_string());

@@ -11,7 +11,7 @@
 //! | `cpu_seconds` | of the whole process, all threads |
 //! | `rays` | `total`, `intersect_packets`, `occluded_packets`, `active_lanes_mean` (of 16) |
 //! | `shifts` | counts by outcome |
-//! | `dropped` | `triangles`, `textures` (missing), `samples` (not finite), `pixels` (without a solution) |
+//! | `dropped` | `triangles`, `textures` (missing), `samples` (not finite), `measurements` (missing in the solve) |
 //! | `peak_memory_bytes` | of the process; null where the system does not say |
 //! | `error_estimate` | root mean variance of the mean primal, W·m⁻²·sr⁻¹; null below two samples |
 //! | `residual` | of the solve, relative; null without one |
@@ -41,15 +41,24 @@ fn peak_memory() -> Option<u64> {
     Some(kib * 1024)
 }
 
+/// The number that was typed, not the nearest f32 written out in f64.
+fn decimal(value: f32) -> Value {
+    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
+}
+
 /// The object, as text.
 pub fn json(job: &Job, report: &Report) -> String {
     let mut settings: Map<String, Value> =
         metadata::settings(job).into_iter().map(|(name, value)| (name.to_owned(), value.into())).collect();
     settings.insert("norm".into(), metadata::method_name(job.method).into());
-    settings.insert("alpha".into(), json!(job.alpha));
+    settings.insert("alpha".into(), decimal(job.alpha));
     settings.insert("threads".into(), json!(report.threads));
-    let shifts: Map<String, Value> =
-        report.statistics.shifts.iter().map(|(outcome, count)| ((*outcome).to_owned(), json!(count))).collect();
+    let shifts: Map<String, Value> = report
+        .statistics
+        .shifts
+        .iter()
+        .map(|(outcome, count)| ((*outcome).to_owned(), json!(count)))
+        .collect();
     let seconds = &report.seconds;
     let rays = &report.statistics.rays;
     let outputs: Vec<_> = job.outputs.iter().map(|o| o.path.display().to_string()).collect();
@@ -83,7 +92,7 @@ pub fn json(job: &Job, report: &Report) -> String {
             "triangles": report.load.dropped_triangles,
             "textures": report.load.missing_textures,
             "samples": report.statistics.dropped_samples,
-            "pixels": report.unsolved_pixels,
+            "measurements": report.missing,
         },
         "peak_memory_bytes": peak_memory(),
         "error_estimate": report.error_estimate,

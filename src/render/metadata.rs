@@ -5,7 +5,9 @@ use super::job::{CameraChoice, Job, Source};
 use crate::error::{Error, Result};
 use crate::integrate::{Filter, Kind};
 use crate::reconstruct::Method;
-use crate::store::Document;
+use crate::scene::{Camera, Projection};
+use crate::store::{Document, layers};
+use glam::{Mat4, Vec3, Vec4};
 use std::path::Path;
 
 /// The word for an integrator on the command line and in files.
@@ -119,5 +121,59 @@ pub(super) fn set_solve(document: &mut Document, method: Method, alpha: f32, res
     if let Some(residual) = residual {
         set(document, "alpha", alpha.to_string());
         set(document, "residual", format!("{residual:e}"));
+    }
+}
+
+/// Adds the camera's matrices, for a film of `width`×`height` (the whole picture).
+pub(super) fn set_camera(document: &mut Document, camera: &Camera, width: u32, height: u32) {
+    // Camera space of the files: y up, z forward; ours looks along −z.
+    let to_camera = Mat4::from_scale(Vec3::new(1.0, 1.0, -1.0)) * Mat4::from(camera.to_world).inverse();
+    let aspect = width as f32 / height as f32;
+    let to_ndc = match camera.projection {
+        Projection::Perspective { yfov } => {
+            let scale = 1.0 / (0.5 * yfov).tan();
+            // w = z; the z of normalised coordinates runs from 0 at NEAR to 1 at infinity.
+            const NEAR: f32 = 0.01;
+            Mat4::from_cols(
+                Vec4::new(scale / aspect, 0.0, 0.0, 0.0),
+                Vec4::new(0.0, scale, 0.0, 0.0),
+                Vec4::new(0.0, 0.0, 1.0, 1.0),
+                Vec4::new(0.0, 0.0, -NEAR, 0.0),
+            )
+        }
+        Projection::Orthographic { ymag } => {
+            Mat4::from_scale(Vec3::new(1.0 / (ymag * aspect), 1.0 / ymag, 1.0 / layers::FAR))
+        }
+    };
+    // Columns of a matrix for column vectors are rows of the one for row vectors.
+    document.world_to_camera = Some(to_camera.to_cols_array());
+    document.world_to_ndc = Some((to_ndc * to_camera).to_cols_array());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Affine3A;
+
+    #[test]
+    fn matrices_agree_with_the_camera() {
+        let camera = Camera {
+            name: String::new(),
+            to_world: Affine3A::from_rotation_y(0.7) * Affine3A::from_translation(Vec3::new(1.0, 2.0, 3.0)),
+            projection: Projection::Perspective { yfov: 0.8 },
+            lens_radius: 0.0,
+            focus_distance: 1.0,
+        };
+        let mut document = Document::new(64, 48);
+        set_camera(&mut document, &camera, 64, 48);
+        // Pixel (16, 12) of 64×48: half-way to the upper left corner.
+        use crate::math::splat;
+        let rays = camera.rays(splat(16.0), splat(12.0), 64, 48, splat(0.5), splat(0.5));
+        let pick = |v: crate::math::Vec3x| Vec3::new(v.x.to_array()[0], v.y.to_array()[0], v.z.to_array()[0]);
+        let point = pick(rays.origin) + 3.0 * pick(rays.direction);
+        let ndc = Mat4::from_cols_array(&document.world_to_ndc.expect("set")) * Vec4::from((point, 1.0));
+        assert!((ndc.x / ndc.w + 0.5).abs() < 1e-5 && (ndc.y / ndc.w - 0.5).abs() < 1e-5, "{ndc}");
+        let local = Mat4::from_cols_array(&document.world_to_camera.expect("set")).transform_point3(point);
+        assert!(local.z > 0.0 && local.x < 0.0 && local.y > 0.0, "{local}");
     }
 }

@@ -22,7 +22,8 @@ pub(super) fn load(job: &Job, monitor: &dyn Monitor) -> Result<(Scene, Camera)> 
         monitor.warn(warning);
     }
     if !has_light(&scene) {
-        monitor.warn(&format!("{}: no light in it, the image is black; add one with --env", job.source.name()));
+        monitor
+            .warn(&format!("{}: no light in it, the image is black; add one with --env", job.source.name()));
     }
     if job.strict {
         check_load(job, &scene)?;
@@ -63,8 +64,10 @@ fn has_light(scene: &Scene) -> bool {
 }
 
 fn check_load(job: &Job, scene: &Scene) -> Result<()> {
-    let counts =
-        [(scene.report.dropped_triangles, "triangles dropped"), (scene.report.missing_textures, "textures missing")];
+    let counts = [
+        (scene.report.dropped_triangles, "triangles dropped"),
+        (scene.report.missing_textures, "textures missing"),
+    ];
     let said: Vec<_> = counts.iter().filter(|c| c.0 > 0).map(|(n, what)| format!("{n} {what}")).collect();
     if said.is_empty() {
         return Ok(());

@@ -7,6 +7,7 @@ use crate::reconstruct::Method;
 use crate::store::png::{self, ToneMap};
 use crate::store::{atomic, exr, layers};
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// Reads the buffers of `input`, solves, and writes the outputs with the layers and the metadata of the input.
 /// Returns the relative residual of the solve.
@@ -16,13 +17,16 @@ pub fn run(
     method: Method,
     alpha: f32,
     (exposure, tone_map): (f32, ToneMap),
+    cancel: &AtomicBool,
 ) -> Result<Option<f64>> {
     for output in outputs {
         atomic::probe(&output.path, &[input])?;
     }
     let mut document = exr::read_file(input)?;
     let buffers = layers::buffers(&document, input)?;
-    let solution = super::solve_planes(&buffers.primal, &buffers.dx, &buffers.dy, &buffers.direct, method, alpha);
+    let solution =
+        super::solve_planes(&buffers.primal, &buffers.dx, &buffers.dy, &buffers.direct, method, alpha);
+    super::go_on(cancel)?;
     layers::set_image(&mut document, &solution.image);
     metadata::set_solve(&mut document, method, alpha, solution.residual);
     for output in outputs {

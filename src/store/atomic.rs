@@ -64,14 +64,15 @@ pub fn probe(path: &Path, inputs: &[&Path]) -> Result<()> {
             return Err(refuse(path, "is an input; choose another name"));
         }
     }
-    hidden_file(path).map(drop).map_err(|e| refuse(path, format!("cannot create a file here: {e}")))
+    hidden_file(path).map(drop).map_err(|e| refuse(path, format!("cannot create a file here: {}", e.kind())))
 }
 
 /// Replaces the file at `path` by `bytes`, whole or not at all.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let failed = |source| Error::Io { path: path.to_owned(), source };
-    let mut file = hidden_file(path).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
+    // The kind alone: the text would name the hidden file.
+    let mut file = hidden_file(path).map_err(|e| failed(e.kind().into()))?;
+    file.as_file_mut().write_all(bytes).map_err(failed)?;
     if let Ok(old) = fs::metadata(path) {
         file.as_file().set_permissions(old.permissions()).map_err(failed)?;
     }

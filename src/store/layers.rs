@@ -8,8 +8,6 @@
 use super::Document;
 use crate::error::{Error, Result};
 use crate::film::{Direction, Film, Half, Plane};
-use crate::scene::{Camera, Projection};
-use glam::{Mat4, Vec3, Vec4};
 
 /// `Z` where the camera ray meets nothing, m: finite, and beyond any scene.
 pub const FAR: f32 = 1e10;
@@ -145,37 +143,10 @@ pub fn buffers(document: &Document, path: &std::path::Path) -> Result<Buffers> {
     Ok(Buffers { primal: plane("primal")?, dx: plane("dx")?, dy: plane("dy")?, direct: plane("emission")? })
 }
 
-/// Adds the camera's matrices, for a film of `width`×`height` (the whole picture).
-pub fn set_camera(document: &mut Document, camera: &Camera, width: u32, height: u32) {
-    // Camera space of the files: y up, z forward; ours looks along −z.
-    let to_camera = Mat4::from_scale(Vec3::new(1.0, 1.0, -1.0)) * Mat4::from(camera.to_world).inverse();
-    let aspect = width as f32 / height as f32;
-    let to_ndc = match camera.projection {
-        Projection::Perspective { yfov } => {
-            let scale = 1.0 / (0.5 * yfov).tan();
-            // w = z; the z of normalised coordinates runs from 0 at NEAR to 1 at infinity.
-            const NEAR: f32 = 0.01;
-            Mat4::from_cols(
-                Vec4::new(scale / aspect, 0.0, 0.0, 0.0),
-                Vec4::new(0.0, scale, 0.0, 0.0),
-                Vec4::new(0.0, 0.0, 1.0, 1.0),
-                Vec4::new(0.0, 0.0, -NEAR, 0.0),
-            )
-        }
-        Projection::Orthographic { ymag } => {
-            Mat4::from_scale(Vec3::new(1.0 / (ymag * aspect), 1.0 / ymag, 1.0 / FAR))
-        }
-    };
-    // Columns of a matrix for column vectors are rows of the one for row vectors.
-    document.world_to_camera = Some(to_camera.to_cols_array());
-    document.world_to_ndc = Some((to_ndc * to_camera).to_cols_array());
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::film::{FilmTile, PixelSample};
-    use glam::Affine3A;
 
     fn small_film() -> Film {
         let mut film = Film::new(4, 3, true, true);
@@ -233,27 +204,5 @@ mod tests {
             error.contains("a.exr") && error.contains("primal") && error.contains("--buffers"),
             "{error}"
         );
-    }
-
-    #[test]
-    fn matrices_agree_with_the_camera() {
-        let camera = Camera {
-            name: String::new(),
-            to_world: Affine3A::from_rotation_y(0.7) * Affine3A::from_translation(Vec3::new(1.0, 2.0, 3.0)),
-            projection: Projection::Perspective { yfov: 0.8 },
-            lens_radius: 0.0,
-            focus_distance: 1.0,
-        };
-        let mut document = Document::new(64, 48);
-        set_camera(&mut document, &camera, 64, 48);
-        // Pixel (16, 12) of 64×48: half-way to the upper left corner.
-        use crate::math::splat;
-        let rays = camera.rays(splat(16.0), splat(12.0), 64, 48, splat(0.5), splat(0.5));
-        let pick = |v: crate::math::Vec3x| Vec3::new(v.x.to_array()[0], v.y.to_array()[0], v.z.to_array()[0]);
-        let point = pick(rays.origin) + 3.0 * pick(rays.direction);
-        let ndc = Mat4::from_cols_array(&document.world_to_ndc.expect("set")) * Vec4::from((point, 1.0));
-        assert!((ndc.x / ndc.w + 0.5).abs() < 1e-5 && (ndc.y / ndc.w - 0.5).abs() < 1e-5, "{ndc}");
-        let local = Mat4::from_cols_array(&document.world_to_camera.expect("set")).transform_point3(point);
-        assert!(local.z > 0.0 && local.x < 0.0 && local.y > 0.0, "{local}");
     }
 }
