@@ -11,3 +11,4 @@ pub mod error;
 pub mod film;
 pub mod math;
 pub mod scene;
+pub mod shade;
