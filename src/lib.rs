@@ -7,7 +7,9 @@
 #![forbid(unsafe_code)]
 
 pub mod accel;
+pub mod analyze;
 pub mod error;
 pub mod film;
 pub mod math;
+pub mod reconstruct;
 pub mod scene;
