@@ -67,8 +67,7 @@ fn look_in(prefix: &Path, on_system: bool) -> Result<Embree, String> {
     let part = |name| {
         number_after(&text, name).ok_or_else(|| format!("{} does not define {name}", config.display()))
     };
-    let version =
-        [part("RTC_VERSION_MAJOR")?, part("RTC_VERSION_MINOR")?, part("RTC_VERSION_PATCH")?];
+    let version = [part("RTC_VERSION_MAJOR")?, part("RTC_VERSION_MINOR")?, part("RTC_VERSION_PATCH")?];
     if version < MINIMUM || version[0] != MINIMUM[0] {
         let (have, want) = (dotted(version), dotted(MINIMUM));
         return Err(format!("Embree in {} is {have}, needed is {want} or a later 4.x", prefix.display()));

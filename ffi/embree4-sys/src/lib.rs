@@ -5,7 +5,14 @@
 //! Use the safe crate `embree4` instead.
 
 /// The generated items; names and meaning are those of Embree's manual.
-#[allow(missing_docs, non_camel_case_types, non_snake_case, non_upper_case_globals, rustdoc::all, clippy::all)]
+#[allow(
+    missing_docs,
+    non_camel_case_types,
+    non_snake_case,
+    non_upper_case_globals,
+    rustdoc::all,
+    clippy::all
+)]
 mod bindings {
     include!(concat!(env!("OUT_DIR"), "/bindings.rs"));
 }
