@@ -9,5 +9,8 @@
 pub mod accel;
 pub mod error;
 pub mod film;
+pub mod integrate;
 pub mod math;
+pub mod path;
 pub mod scene;
+pub mod shade;

@@ -4,6 +4,13 @@
 //! All backends see the same sanitised meshes and use the same ids: `instance` indexes `Scene::instances`,
 //! `primitive` the triangles of its mesh.
 
+pub mod brute;
+mod flat;
+pub mod obvhs;
+
+pub use brute::BruteAccel;
+pub use obvhs::ObvhsAccel;
+
 use crate::math::{LANES, Mask, Vec3x, f32x16, splat};
 
 /// Sixteen rays; `direction` need not be normalised, distances are in units of its length.
@@ -42,6 +49,18 @@ pub struct Hits {
     pub instance: [u32; LANES],
     /// Triangle of the instance's mesh; unspecified where not `valid`.
     pub primitive: [u32; LANES],
+}
+
+impl Hits {
+    /// No lane hit anything.
+    pub const NONE: Self = Self {
+        valid: Mask::NONE,
+        t: f32x16::ZERO,
+        u: f32x16::ZERO,
+        v: f32x16::ZERO,
+        instance: [0; LANES],
+        primitive: [0; LANES],
+    };
 }
 
 /// Whether the rays of a packet start close together and run alike. A hint: it decides speed, never the result.

@@ -1,0 +1,122 @@
+//! Gradient-domain path tracing (Kettunen, Manzi, Aittala, Lehtinen, Durand, Zwicker 2015): the path tracer's image
+//! and its differences to the four neighbours.
+//!
+//! Per block and sample: two coherent packets give the first vertex of 16 base and 64 offset paths; the head walks
+//! them until all offsets are settled; the tail is plain path tracing, and its radiance T enters the gradients by a
+//! factor known when it starts.
+
+use super::block::{Block, Primary, neighbours};
+use super::head::{Head, Offset, Walk};
+use super::path::write_primary;
+use super::wave::Region;
+use super::{Integrator, ShiftOutcome, Statistics, View};
+use crate::accel::Accel;
+use crate::film::{Direction, FilmTile, PixelSample};
+use crate::math::{Mask, Permute, Rgb, f32x16, splat};
+use crate::path::tail::{self, Queues, Slot};
+use crate::path::trace::Tracer;
+use crate::shade::Surface;
+
+/// The gradient-domain path tracer.
+pub struct GradientPath;
+
+/// The offsets' first vertices: lane permutations of block and ring.
+fn first_offsets(block: &Block, region: &Region, primary: &Primary, ring: &Primary) -> [Offset; 4] {
+    let hit = [primary.hits.valid, ring.hits.valid];
+    Direction::ALL.map(|direction| {
+        let from = neighbours(direction);
+        let exists = block.has_neighbour(direction, region) & block.inside;
+        let met = Mask::from_fn(|i| hit[from[i] / 16].get(from[i] % 16));
+        let own = exists & met & primary.hits.valid;
+        Offset {
+            surface: <Surface as Permute>::permute(&primary.surface, &ring.surface, &from),
+            beta: own.keep(Rgb::grey(1.0)),
+            ratio: own.keep(splat(1.0)),
+            own,
+            recent: Mask::NONE,
+            connected: Mask::NONE,
+            exists,
+        }
+    })
+}
+
+/// Adds the head's results to samples and slots.
+fn write_head(
+    head: &Head,
+    block: &Block,
+    slots: &[u32],
+    samples: &mut [PixelSample],
+    tails: &mut [Slot],
+    factors: &mut [[[f32; 3]; 4]],
+) {
+    for i in block.inside.iter() {
+        let slot = slots[i] as usize;
+        tails[slot].radiance = head.radiance.lane(i).to_array();
+        for d in 0..4 {
+            samples[slot].gradient[d] = head.gradient[d].lane(i).to_array();
+            factors[slot][d] = head.tail_factor[d].lane(i).to_array();
+        }
+    }
+}
+
+impl Integrator for GradientPath {
+    const HAS_GRADIENTS: bool = true;
+
+    fn wave<A: Accel>(
+        &self,
+        view: &View<'_>,
+        tracer: &mut Tracer<'_, A>,
+        region: &Region,
+        wave: std::ops::Range<u32>,
+        tile: &mut FilmTile,
+        statistics: &mut Statistics,
+    ) {
+        let mut slots = region.slots(view.settings.seed, &wave);
+        let mut samples = vec![PixelSample::default(); slots.len()];
+        let mut factors = vec![[[0.0_f32; 3]; 4]; slots.len()];
+        let mut queues = Queues::default();
+        for block in Block::of_region(region, view.settings.seed) {
+            let ring_inside = block.ring_inside(region);
+            for index in wave.clone() {
+                let primary = block.primary(view, tracer, index);
+                let lanes = block.slots(region, index - wave.start);
+                let direct = primary.direct(tracer);
+                write_primary(&mut samples, &lanes, &block, &primary, direct);
+                if primary.hits.valid.none() || view.limits.max_depth < 2 {
+                    continue;
+                }
+                let ring = block.ring(view, tracer, index, ring_inside);
+                let offsets = first_offsets(&block, region, &primary, &ring);
+                let mut head = Head {
+                    surface: primary.surface,
+                    beta: Rgb::grey(1.0),
+                    eta_squared: f32x16::splat(1.0),
+                    active: primary.hits.valid,
+                    offsets,
+                    radiance: Rgb::ZERO,
+                    gradient: [Rgb::ZERO; 4],
+                    tail_factor: [Rgb::ZERO; 4],
+                    outcomes: [0; ShiftOutcome::COUNT],
+                };
+                let missed = offsets.iter().map(|o| (o.exists & primary.hits.valid).and_not(o.own).count());
+                head.outcomes[ShiftOutcome::NoPrimaryHit as usize] = missed.map(u64::from).sum();
+                let walk = Walk { view, streams: block.streams(index), slots: lanes };
+                head.walk(tracer, &walk, &mut queues);
+                write_head(&head, &block, &lanes, &mut samples, &mut slots, &mut factors);
+                for (sum, count) in statistics.shifts.iter_mut().zip(head.outcomes) {
+                    *sum += count;
+                }
+            }
+        }
+        tail::run(tracer, &mut queues, &mut slots, &view.limits);
+        for ((sample, slot), factors) in samples.iter_mut().zip(&slots).zip(&factors) {
+            sample.primal = slot.radiance;
+            for (gradient, factor) in sample.gradient.iter_mut().zip(factors) {
+                for c in 0..3 {
+                    gradient[c] += factor[c] * slot.tail[c];
+                }
+            }
+        }
+        region.develop(&wave, &samples, tile);
+    }
+}
