@@ -10,6 +10,7 @@ pub use self::job::{Backend, CameraChoice, EnvironmentOptions, Format, Job, Lens
 pub use self::prepare::open;
 use self::prepare::{check_memory, load};
 
+use crate::accel::embree::flush_denormals;
 use crate::accel::{Accel, EmbreeAccel, ObvhsAccel};
 use crate::error::{Error, Result};
 use crate::film::{Film, Half, Plane};
@@ -17,6 +18,7 @@ use crate::integrate::{self, Statistics};
 use crate::reconstruct::{Input, Method, reconstruct};
 use crate::scene::{Camera, LoadReport, Scene};
 use crate::store::{Window, atomic, exr, layers, png};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -72,6 +74,8 @@ pub struct Report {
     pub error_estimate: Option<f64>,
     /// Relative residual of the solve; `None` without one.
     pub residual: Option<f64>,
+    /// Samples dropped because they were not finite.
+    pub dropped_samples: u64,
     /// Measurements the solve did without because they were not finite.
     pub missing: usize,
     /// Threads that worked.
@@ -84,42 +88,34 @@ pub fn run(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Repo
     for output in &job.outputs {
         atomic::probe(&output.path, &job.inputs())?;
     }
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(job.threads)
-        .build()
-        .map_err(|e| Error::OutOfMemory(format!("cannot start {} threads: {e}", job.threads)))?;
-    pool.install(|| run_in_pool(job, monitor, cancel))
-}
-
-fn run_in_pool(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Report> {
+    check_memory(job)?;
+    let work = Work { job, monitor, cancel, pool: pool(job.threads)? };
     let mut seconds = Seconds::default();
-    let threads = rayon::current_num_threads();
 
-    let (loaded, time) = timed(|| load(job, monitor));
+    monitor.stage("load");
+    let (loaded, time) = timed(|| work.pool.install(|| load(job, monitor)));
     let (scene, camera) = loaded?;
     seconds.load = time;
-    check_memory(job)?;
-    go_on(cancel)?;
+    work.go_on()?;
 
     let rendered = match job.backend {
-        Backend::Embree => {
-            let build = || EmbreeAccel::new(&scene, threads, job.robust, job.max_memory);
-            integrate_with(job, (&scene, &camera), build, &mut seconds, monitor, cancel)
-        }
+        // Embree builds with threads of its own.
+        Backend::Embree => work.integrate(&scene, &camera, &mut seconds, || {
+            EmbreeAccel::new(&scene, job.threads, job.robust, job.max_memory)
+        }),
         Backend::Obvhs => {
-            let build = || ObvhsAccel::new(&scene);
-            integrate_with(job, (&scene, &camera), build, &mut seconds, monitor, cancel)
+            work.integrate(&scene, &camera, &mut seconds, || work.pool.install(|| ObvhsAccel::new(&scene)))
         }
     };
     let (film, statistics) = rendered?;
 
     monitor.stage("reconstruct");
-    let (solution, time) = timed(|| solve(&film, job.method, job.alpha));
+    let (solved, time) = timed(|| work.pool.install(|| solve(&film, job.method, job.alpha)));
     seconds.reconstruct = time;
-    go_on(cancel)?;
+    work.go_on()?;
 
     monitor.stage("write");
-    let (written, time) = timed(|| write(job, &film, &camera, &solution));
+    let (written, time) = timed(|| work.pool.install(|| write(job, &film, &camera, &solved)));
     written?;
     seconds.write = time;
 
@@ -131,10 +127,59 @@ fn run_in_pool(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<
         triangles: scene.triangle_count(),
         samples: film.width as u64 * film.height as u64 * u64::from(film.samples(Half::Both)),
         error_estimate: error_estimate(&film),
-        residual: solution.residual,
-        missing: solution.missing,
-        threads,
+        residual: solved.residual,
+        dropped_samples: film.dropped_samples,
+        missing: solved.missing,
+        threads: job.threads,
     })
+}
+
+/// Workers that flush denormals to zero: they are slow, and darker than any image.
+fn pool(threads: usize) -> Result<ThreadPool> {
+    ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .start_handler(|_| flush_denormals())
+        .build()
+        .map_err(|e| Error::OutOfMemory(format!("cannot start {threads} threads: {e}")))
+}
+
+/// A job under way.
+struct Work<'a> {
+    job: &'a Job,
+    monitor: &'a dyn Monitor,
+    cancel: &'a AtomicBool,
+    pool: ThreadPool,
+}
+
+impl Work<'_> {
+    /// Fails once the work is cancelled.
+    fn go_on(&self) -> Result<()> {
+        go_on(self.cancel)
+    }
+
+    /// Builds one backend and integrates with it, dispatched statically.
+    fn integrate<A: Accel>(
+        &self,
+        scene: &Scene,
+        camera: &Camera,
+        seconds: &mut Seconds,
+        build: impl FnOnce() -> Result<A>,
+    ) -> Result<(Film, Statistics)> {
+        self.monitor.stage("build");
+        let (accel, time) = timed(build);
+        let accel = accel?;
+        seconds.build = time;
+        self.go_on()?;
+
+        self.monitor.stage("render");
+        let settings = &self.job.settings;
+        let on_progress = |done, total| self.monitor.progress(done, total);
+        let integrate = || integrate::run(scene, &accel, camera, settings, &on_progress, self.cancel);
+        let (result, time) = timed(|| self.pool.install(integrate));
+        seconds.render = time;
+        self.go_on()?;
+        Ok(result)
+    }
 }
 
 /// The result of `f` and the seconds it took.
@@ -150,35 +195,12 @@ fn go_on(cancel: &AtomicBool) -> Result<()> {
 
 /// Fails where the job is strict and its render left something out; the images are written nevertheless.
 pub fn check_strict(job: &Job, report: &Report) -> Result<()> {
-    let dropped = report.statistics.dropped_samples;
+    let dropped = report.dropped_samples;
     if job.strict && (dropped > 0 || report.missing > 0) {
         let what = format!("{dropped} samples dropped, {} measurements missing", report.missing);
         return Err(prepare::strict(job, &what));
     }
     Ok(())
-}
-
-/// Builds one backend and integrates with it: the one place that knows which.
-fn integrate_with<A: Accel>(
-    job: &Job,
-    (scene, camera): (&Scene, &Camera),
-    build: impl FnOnce() -> Result<A>,
-    seconds: &mut Seconds,
-    monitor: &dyn Monitor,
-    cancel: &AtomicBool,
-) -> Result<(Film, Statistics)> {
-    monitor.stage("build");
-    let (accel, time) = timed(build);
-    let accel = accel?;
-    seconds.build = time;
-    go_on(cancel)?;
-
-    monitor.stage("render");
-    let on_progress = |done, total| monitor.progress(done, total);
-    let (result, time) = timed(|| integrate::run(scene, &accel, camera, &job.settings, &on_progress, cancel));
-    seconds.render = time;
-    go_on(cancel)?;
-    Ok(result)
 }
 
 /// The finished image and how well it solves its equations.

@@ -97,7 +97,10 @@ fn reads_every_form_of_a_path() {
 fn the_order_has_no_cycle() {
     for (i, (name, may_use)) in ORDER.iter().enumerate() {
         for used in *may_use {
-            assert!(ORDER[..i].iter().any(|(above, _)| above == used), "{name} may use {used}, which is not above it");
+            assert!(
+                ORDER[..i].iter().any(|(above, _)| above == used),
+                "{name} may use {used}, which is not above it"
+            );
         }
     }
 }
@@ -127,7 +130,8 @@ fn modules_use_only_what_is_below_them() {
 #[test]
 fn only_accel_knows_embree() {
     for (path, text) in sources() {
-        let names_it = text.lines().map(|l| l.split("//").next().unwrap_or_default()).any(|l| l.contains("embree4"));
+        let names_it =
+            text.lines().map(|l| l.split("//").next().unwrap_or_default()).any(|l| l.contains("embree4"));
         assert!(!names_it || module(&path) == "accel", "{} names embree4", path.display());
     }
 }

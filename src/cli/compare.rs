@@ -1,7 +1,7 @@
 //! `gdpt compare`: the error of an image against a reference.
 
 use super::terminal;
-use crate::analyze::metrics::{self, Metrics};
+use crate::analyze::metrics::{self, Comparison};
 use crate::error::{Error, Result};
 use crate::film::Plane;
 use crate::store::png::{self, ToneMap};
@@ -48,19 +48,16 @@ pub fn run(flags: &Flags) -> Result<()> {
     }
     let (test, reference) = (image(&flags.test)?, image(&flags.reference)?);
     let size = |p: &Plane| format!("{}x{}", p.width, p.height);
-    if size(&test) != size(&reference) {
-        return Err(Error::Scene {
-            path: flags.test.clone(),
-            at: String::new(),
-            what: format!(
-                "has {} pixels, {} has {}; compare images of one size",
-                size(&test),
-                flags.reference.display(),
-                size(&reference)
-            ),
-        });
-    }
-    let metrics = metrics::compare(&test, &reference);
+    let metrics = metrics::compare(&test, &reference).ok_or_else(|| Error::Scene {
+        path: flags.test.clone(),
+        at: String::new(),
+        what: format!(
+            "is {}, {} is {}; compare images of one size",
+            size(&test),
+            flags.reference.display(),
+            size(&reference)
+        ),
+    })?;
     if let Some(path) = &flags.heatmap {
         png::write(path, &heatmap(&test, &reference), 0.0, ToneMap::None)?;
     }
@@ -76,39 +73,31 @@ fn image(path: &Path) -> Result<Plane> {
     })
 }
 
-fn json(m: &Metrics) -> String {
-    let object = serde_json::json!({
-        "rel_mse": m.rel_mse,
-        "mse": m.mse,
-        "psnr": m.psnr,
-        "mean_test": m.mean_test,
-        "mean_reference": m.mean_reference,
-        "nan_pixels": m.nan_pixels,
-    });
-    format!("{object:#}\n")
+/// The object of `--json`; what is not finite (PSNR of equal images) is null.
+fn json(m: &Comparison) -> String {
+    let object = serde_json::to_string_pretty(m).expect("numbers by name are always JSON");
+    format!("{object}\n")
 }
 
-fn text(m: &Metrics) -> String {
+fn text(m: &Comparison) -> String {
     let mut text = String::new();
     let mut row = |name: &str, value: String| {
         writeln!(text, "{name:<15}{value}").expect("a string grows");
     };
     row("relMSE", format!("{:.6e}  mean of (T - R)^2 / (mean(R)^2 + 0.001)", m.rel_mse));
     row("MSE", format!("{:.6e}  mean of (T - R)^2", m.mse));
-    row("PSNR", format!("{:.2} dB  10 log10(1 / MSE)", m.psnr));
+    row("PSNR", format!("{:.2} dB  10 log10(P^2 / MSE), P the largest value of the reference", m.psnr));
     row("mean test", format!("{:.6e}", m.mean_test));
     row("mean reference", format!("{:.6e}", m.mean_reference));
-    row("NaN pixels", format!("{}  left out of everything above", m.nan_pixels));
+    row("difference", format!("{:+.4} %  of the means, relative", 100.0 * m.mean_difference));
+    row("NaN pixels", format!("{}  not finite in either image, left out above", m.nan_pixels));
     text
 }
 
-/// Root of the relative squared error of each pixel, as a picture.
+/// Root of the relative squared error of each pixel, as a picture; what is not finite is black.
 fn heatmap(test: &Plane, reference: &Plane) -> Plane {
     Plane::from_fn(test.width, test.height, |x, y| {
-        let (t, r) = (test.at(x, y), reference.at(x, y));
-        let mean = (r[0] + r[1] + r[2]) / 3.0;
-        let square: f32 = t.iter().zip(r).map(|(t, r)| (t - r).powi(2)).sum();
-        let error = (square / 3.0 / (mean * mean + 0.001)).sqrt();
+        let error = metrics::pixel_rel_mse(test.at(x, y), reference.at(x, y)).sqrt() as f32;
         // Black, red, yellow, white: one channel after the other.
         std::array::from_fn(|c| (3.0 * error - c as f32).clamp(0.0, 1.0))
     })

@@ -19,7 +19,7 @@ pub enum Style {
     Bar,
     /// A line every ten per cent, one a second at most
     Plain,
-    /// A JSON object a second: stage, done, total, seconds, seconds_left
+    /// A JSON object where a stage begins, and one a second: stage, done, total, seconds, seconds_left
     Json,
     /// Nothing
     None,
@@ -110,6 +110,9 @@ impl Monitor for Progress {
         state.begin = Instant::now();
         state.last = state.begin;
         state.tenths = 0;
+        if self.style == Style::Json {
+            terminal::line(&serde_json::json!({ "stage": name }).to_string());
+        }
         self.bar.set_message(name.to_owned());
         self.bar.set_position(0);
         self.bar.reset_elapsed();

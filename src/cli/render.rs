@@ -5,6 +5,7 @@ use super::progress::Progress;
 use super::signals::Signals;
 use super::{statistics, terminal};
 use crate::error::Result;
+use crate::integrate::ShiftOutcome;
 use crate::render::{self, Job, Report, metadata};
 use crate::store::atomic;
 use std::fmt::Write;
@@ -55,7 +56,7 @@ fn summary(job: &Job, report: &Report, verbose: bool) -> String {
     let per_second = |count: u64| count as f64 / seconds.render.max(1e-9) / 1e6;
     row("samples", format!("{}, {:.2} M/s", report.samples, per_second(report.samples)));
     let rays = &report.statistics.rays;
-    let lanes = statistics::active_lanes_mean(rays);
+    let lanes = rays.active_lanes_mean();
     row("rays", format!("{}, {:.2} M/s, {lanes:.1} of 16 lanes active", rays.total, per_second(rays.total)));
     if let Some(error) = report.error_estimate {
         row("error", format!("{error:.2e} (root mean variance of the samples' mean, before reconstruction)"));
@@ -63,14 +64,14 @@ fn summary(job: &Job, report: &Report, verbose: bool) -> String {
     let dropped = [
         (report.load.dropped_triangles, "triangles dropped"),
         (report.load.missing_textures, "textures missing"),
-        (report.statistics.dropped_samples, "samples dropped"),
+        (report.dropped_samples, "samples dropped"),
         (report.missing as u64, "measurements missing"),
     ];
     for (count, what) in dropped.iter().filter(|d| d.0 > 0) {
         row(what, count.to_string());
     }
     if verbose {
-        for (outcome, count) in &report.statistics.shifts {
+        for (outcome, count) in ShiftOutcome::NAMES.iter().zip(report.statistics.shifts) {
             row("shifts", format!("{count:>14} {outcome}"));
         }
     }

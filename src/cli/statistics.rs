@@ -18,14 +18,9 @@
 //! | `warnings` | of the loader |
 //! | `outputs` | files written |
 
-use crate::integrate::RayCounts;
+use crate::integrate::ShiftOutcome;
 use crate::render::{Job, Report, metadata};
 use serde_json::{Map, Value, json};
-
-/// Mean count of active lanes of a packet.
-pub fn active_lanes_mean(rays: &RayCounts) -> f64 {
-    rays.active_lanes as f64 / (rays.intersect_packets + rays.occluded_packets).max(1) as f64
-}
 
 /// CPU time of this process, s.
 fn cpu_seconds() -> f64 {
@@ -53,11 +48,10 @@ pub fn json(job: &Job, report: &Report) -> String {
     settings.insert("norm".into(), metadata::method_name(job.method).into());
     settings.insert("alpha".into(), decimal(job.alpha));
     settings.insert("threads".into(), json!(report.threads));
-    let shifts: Map<String, Value> = report
-        .statistics
-        .shifts
-        .iter()
-        .map(|(outcome, count)| ((*outcome).to_owned(), json!(count)))
+    let shifts: Map<String, Value> = ShiftOutcome::NAMES
+        .into_iter()
+        .zip(report.statistics.shifts)
+        .map(|(outcome, count)| (outcome.to_owned(), count.into()))
         .collect();
     let seconds = &report.seconds;
     let rays = &report.statistics.rays;
@@ -85,13 +79,13 @@ pub fn json(job: &Job, report: &Report) -> String {
             "total": rays.total,
             "intersect_packets": rays.intersect_packets,
             "occluded_packets": rays.occluded_packets,
-            "active_lanes_mean": active_lanes_mean(rays),
+            "active_lanes_mean": rays.active_lanes_mean(),
         },
         "shifts": shifts,
         "dropped": {
             "triangles": report.load.dropped_triangles,
             "textures": report.load.missing_textures,
-            "samples": report.statistics.dropped_samples,
+            "samples": report.dropped_samples,
             "measurements": report.missing,
         },
         "peak_memory_bytes": peak_memory(),

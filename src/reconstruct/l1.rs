@@ -137,7 +137,13 @@ impl<'a> Rows<'a> {
                     sum += self.row_weights(y, NO_PRIMAL, reg, square, &row.norm[0], &mut w0[part.clone()]);
                     sum += self.row_weights(y, NO_DX, reg, 1.0, &row.norm[1], &mut wx[part.clone()]);
                     sum += self.row_weights(y, NO_DY, reg, 1.0, &row.norm[2], &mut wy[part.clone()]);
-                    normal_residual(row, &v[y * stride..][..stride], [&w0[part.clone()], &wx[part.clone()], &wy[part]], above, r);
+                    normal_residual(
+                        row,
+                        &v[y * stride..][..stride],
+                        [&w0[part.clone()], &wx[part.clone()], &wy[part]],
+                        above,
+                        r,
+                    );
                 }
                 sum
             },
@@ -183,7 +189,13 @@ fn weigh(weight: &[f32], value: &[f32], out: &mut [f32]) {
 }
 
 /// One row of −Kᵀ ω (K v − b); `above` is the weighted vertical residual of the row above, then of this one.
-fn normal_residual(row: &RowResidual, v: &[f32], [w0, wx, wy]: [&[f32]; 3], above: &mut [f32], r: &mut [f32]) {
+fn normal_residual(
+    row: &RowResidual,
+    v: &[f32],
+    [w0, wx, wy]: [&[f32]; 3],
+    above: &mut [f32],
+    r: &mut [f32],
+) {
     let w = w0.len();
     for c in 0..3 {
         let part = c * w..(c + 1) * w;
@@ -208,8 +220,11 @@ pub(super) fn solve(problem: &Problem, alpha: f32) -> Solution {
 /// The L1 image by a schedule of one's own.
 pub(super) fn solve_with(problem: &Problem, alpha: f32, schedule: Schedule) -> Solution {
     let mut v = l2::correction::<f32>(problem, alpha);
-    let done = |v: &[f32], residual, iterations| {
-        Solution { image: problem.image(v), residual, iterations, missing: problem.missing }
+    let done = |v: &[f32], residual, iterations| Solution {
+        image: problem.image(v),
+        residual,
+        iterations,
+        missing: problem.missing,
     };
     if v.is_empty() {
         return done(&v, 0.0, 0);
@@ -225,7 +240,9 @@ pub(super) fn solve_with(problem: &Problem, alpha: f32, schedule: Schedule) -> S
     for outer in 0..schedule.outer {
         let reg = (scale * schedule.reg * schedule.decay.powi(outer as i32)) as f32;
         let objective = rows.reweight(&v, reg, &mut weights, &mut r);
-        if std::env::var("L1_TRACE").is_ok() { eprintln!("outer {outer} objective {objective}"); }
+        if std::env::var("L1_TRACE").is_ok() {
+            eprintln!("outer {outer} objective {objective}");
+        }
         change = (before - objective) / objective;
         if change < schedule.tolerance {
             return done(&v, change, outer);

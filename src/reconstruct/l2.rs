@@ -7,10 +7,10 @@
 //! With missing rows the operator is no longer diagonal. The same problem with the weight zero for those rows is
 //! then solved by conjugate gradients to [`TOLERANCE`], started from the transform.
 
+use super::Solution;
 use super::dct::{DctSolver, Real};
 use super::multigrid::{Multigrid, Weights};
 use super::rows::{BAND, NO_DX, NO_DY, NO_PRIMAL, Problem};
-use super::Solution;
 use rayon::prelude::*;
 
 /// Relative residual at which the solve around missing rows stops.
@@ -45,7 +45,8 @@ pub(super) fn solve(problem: &Problem, alpha: f32) -> Solution {
     }
     let mut multigrid = Multigrid::new(weights(problem, alpha));
     multigrid.subtract_product(&y, &mut r);
-    let (iterations, left) = multigrid.conjugate_gradients(&mut y, &mut r, MAX_STEPS, scale * TOLERANCE.powi(2));
+    let (iterations, left) =
+        multigrid.conjugate_gradients(&mut y, &mut r, MAX_STEPS, scale * TOLERANCE.powi(2));
     let residual = if scale > 0.0 { (left / scale).sqrt() } else { 0.0 };
     Solution { image: problem.image(&y), residual, iterations, missing: problem.missing }
 }

@@ -41,7 +41,8 @@ impl Weights {
         let at = |plane: &[f32], x: usize, y: usize| {
             if x < self.width && y < self.height { plane[y * self.width + x] } else { 0.0 }
         };
-        let rows = coarse.w0.par_chunks_mut(w).zip(coarse.wx.par_chunks_mut(w)).zip(coarse.wy.par_chunks_mut(w));
+        let rows =
+            coarse.w0.par_chunks_mut(w).zip(coarse.wx.par_chunks_mut(w)).zip(coarse.wy.par_chunks_mut(w));
         rows.enumerate().for_each(|(y, ((w0, wx), wy))| {
             for x in 0..w {
                 let (x2, y2) = (2 * x, 2 * y);
@@ -199,7 +200,8 @@ impl Level {
                     let (rhs, inverse) = (&rhs[y * stride..][..stride], &self.inverse[y * w..][..w]);
                     for c in 0..3 {
                         let part = c * w..(c + 1) * w;
-                        let (rhs, product, v) = (&rhs[part.clone()], &product[part.clone()], &three[1][part.clone()]);
+                        let (rhs, product, v) =
+                            (&rhs[part.clone()], &product[part.clone()], &three[1][part.clone()]);
                         let out = &mut out[part];
                         for x in 0..w {
                             out[x] = v[x] + inverse[x] * (rhs[x] - product[x]);
@@ -302,7 +304,9 @@ impl Multigrid {
             |window, (band, (next, q))| {
                 window.start(band * BAND, &fill);
                 let mut dot = 0.0;
-                for (i, (next, q)) in next.chunks_exact_mut(stride).zip(q.chunks_exact_mut(stride)).enumerate() {
+                for (i, (next, q)) in
+                    next.chunks_exact_mut(stride).zip(q.chunks_exact_mut(stride)).enumerate()
+                {
                     let three = window.advance(band * BAND + i, weights.height, &fill);
                     weights.row_product(band * BAND + i, three, q);
                     next.copy_from_slice(three[1]);
@@ -316,7 +320,13 @@ impl Multigrid {
 
     /// Improves `x` by at most `steps` steps, `r` being its residual on entry and on return. Stops where the square
     /// of the residual's norm is at most `enough`; returns the steps taken and that square.
-    pub fn conjugate_gradients(&mut self, x: &mut [f32], r: &mut [f32], steps: usize, enough: f64) -> (usize, f64) {
+    pub fn conjugate_gradients(
+        &mut self,
+        x: &mut [f32],
+        r: &mut [f32],
+        steps: usize,
+        enough: f64,
+    ) -> (usize, f64) {
         let mut left = super::l2::norm_square(r);
         let zero = || vec![0.0f32; r.len()];
         let (mut z, mut p, mut last, mut q) = (zero(), zero(), zero(), zero());

@@ -70,7 +70,12 @@ impl<'a> Problem<'a> {
         let mut filled = self.primal.as_ref().clone();
         for i in (0..w * h).filter(|&i| self.mask[i] & NO_PRIMAL != 0) {
             let (x, y) = (i % w, i / w);
-            let around = [(x > 0, i.wrapping_sub(1)), (x + 1 < w, i + 1), (y > 0, i.wrapping_sub(w)), (y + 1 < h, i + w)];
+            let around = [
+                (x > 0, i.wrapping_sub(1)),
+                (x + 1 < w, i + 1),
+                (y > 0, i.wrapping_sub(w)),
+                (y + 1 < h, i + w),
+            ];
             let mut sum = [0.0; 3];
             let mut count = 0.0;
             for (_, j) in around.into_iter().filter(|&(inside, j)| inside && self.mask[j] & NO_PRIMAL == 0) {
@@ -142,8 +147,10 @@ impl<'a> Problem<'a> {
             }
             for (i, row) in rows.chunks_exact_mut(stride).enumerate() {
                 self.residuals(band * BAND + i, &mut ex, &mut ey);
-                for ((out, ex), (ey, above)) in
-                    row.chunks_exact_mut(w).zip(ex.chunks_exact(w)).zip(ey.chunks_exact(w).zip(above.chunks_exact(w)))
+                for ((out, ex), (ey, above)) in row
+                    .chunks_exact_mut(w)
+                    .zip(ex.chunks_exact(w))
+                    .zip(ey.chunks_exact(w).zip(above.chunks_exact(w)))
                 {
                     out[0] = weight * (above[0] - ey[0] - ex[0]);
                     for x in 1..w {

@@ -1,19 +1,19 @@
 //! Before the first ray: the scene with its environment, the camera, the budget.
 
 use super::Monitor;
-use super::job::{CameraChoice, Job, Source};
+use super::job::{CameraChoice, EnvironmentOptions, Job, Source};
 use crate::error::{Error, Result};
 use crate::scene::{self, Camera, Environment, Projection, Scene};
 use glam::Affine3A;
 
 /// The scene and the camera that look at each other.
 pub(super) fn load(job: &Job, monitor: &dyn Monitor) -> Result<(Scene, Camera)> {
-    monitor.stage("load");
     let mut scene = open(&job.source, &job.load)?;
     if let Some(options) = &job.environment {
-        let environment =
-            Environment::load(&options.path, options.strength, options.rotation, job.background)?;
-        scene.environment = Some(environment);
+        let EnvironmentOptions { path, strength, rotation } = options;
+        let report = &mut scene.report;
+        scene.environment =
+            Some(Environment::load_reporting(path, *strength, *rotation, job.background, report)?);
     }
     if let Some(environment) = &mut scene.environment {
         environment.visible = job.background;
@@ -47,7 +47,7 @@ pub fn open(source: &Source, options: &scene::LoadOptions) -> Result<Scene> {
     match source {
         Source::Builtin(name) => scene::builtin(name).ok_or_else(|| Error::Input {
             path: source.path(),
-            what: "there is no such built-in scene; there is builtin:cornell-box".into(),
+            what: format!("is not built in; there is builtin:{}", scene::BUILTIN_NAMES.join(", builtin:")),
         }),
         Source::File(path) => scene::load(path, options),
     }
