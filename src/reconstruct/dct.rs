@@ -23,8 +23,8 @@ const BLOCK: usize = 16;
 const ROW_PAIRS: usize = 8;
 
 /// The scalar of a solve: f32 in production, f64 as its oracle.
-pub trait Real: FftNum + Float {}
-impl<T: FftNum + Float> Real for T {}
+pub trait Real: FftNum + Float + From<f32> {}
+impl<T: FftNum + Float + From<f32>> Real for T {}
 
 /// `value` in the precision of the solve.
 pub(crate) fn real<T: Real>(value: f64) -> T {
