@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::reconstruct::Method;
 use crate::store::png::{self, ToneMap};
 use crate::store::{atomic, exr, layers};
+use std::num::NonZero;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -24,8 +25,11 @@ pub fn run(
     }
     let mut document = exr::read_file(input)?;
     let buffers = layers::buffers(&document, input)?;
-    let solution =
-        super::solve_planes(&buffers.primal, &buffers.dx, &buffers.dy, &buffers.direct, method, alpha);
+    // The same kind of workers as a render has: equal buffers give equal bytes.
+    let workers = super::pool(std::thread::available_parallelism().map_or(1, NonZero::get))?;
+    let solution = workers.install(|| {
+        super::solve_planes(&buffers.primal, &buffers.dx, &buffers.dy, &buffers.direct, method, alpha)
+    });
     super::go_on(cancel)?;
     layers::set_image(&mut document, &solution.image);
     metadata::set_solve(&mut document, method, alpha, solution.residual);
