@@ -32,7 +32,7 @@ pub(super) struct Schedule {
 }
 
 /// The schedule of [`solve`].
-pub(super) const DEFAULT: Schedule = Schedule { outer: 8, steps: 2, reg: 0.1, decay: 0.5, tolerance: 5e-4 };
+pub(super) const DEFAULT: Schedule = Schedule { outer: 8, steps: 3, reg: 0.1, decay: 0.6, tolerance: 5e-4 };
 
 /// The rows of the problem, α-rows included, seen from the correction y = x − g.
 struct Rows<'a> {

@@ -1,6 +1,5 @@
 //! Oracles and properties of the solvers: algorithm tests T11, T12, T14 and the solver's reliability rows.
 
-use super::dct::DctSolver;
 use super::multigrid::Multigrid;
 use super::rows::Problem;
 use super::*;
@@ -448,7 +447,6 @@ fn l1_reaches_the_objective_of_a_long_run() {
         let best = objective(&l1::solve_with(&problem, 0.2, long).image);
         let solution = reconstruct(&planes.input(), Method::L1, 0.2);
         let ours = objective(&solution.image);
-        eprintln!("objective {ours} against {best}, {} reweightings", solution.iterations);
         assert!(ours < 1.005 * best, "{ours} against {best}");
         assert!(solution.residual < 0.005, "{}", solution.residual);
     }
