@@ -88,6 +88,7 @@ pub(super) fn split(bytes: &[u8]) -> Result<Chunks, Fault> {
 }
 
 /// The JSON as types, and what of it is not typed because it is not honoured.
+#[derive(Debug)]
 pub(super) struct Parsed {
     pub(super) root: Root,
     pub(super) is_animated: bool,
@@ -198,14 +199,13 @@ mod tests {
     fn whole_numbers_become_integers_and_wide_indices_are_refused() {
         let good =
             br#"{"asset":{"version":"2.0"},"scene":1e0,"bufferViews":[{"buffer":0.0,"byteLength":10e-1}]}"#;
-        let parsed = parse(good).ok().expect("integers written as floats are legal");
+        let parsed = parse(good).expect("integers written as floats are legal");
         assert_eq!(parsed.root.scene.map(|s| s.value()), Some(1));
         let wide =
-            parse(br#"{"asset":{"version":"2.0"},"scene":4294967296}"#).err().expect("no index is that wide");
+            parse(br#"{"asset":{"version":"2.0"},"scene":4294967296}"#).expect_err("no index is that wide");
         assert_eq!(wide.0, "scene");
         let typed = parse(br#"{"asset":{"version":"2.0"},"meshes":[{"primitives":[{"attributes":3}]}]}"#)
-            .err()
-            .expect("attributes are an object");
+            .expect_err("attributes are an object");
         assert_eq!(typed.0, "meshes[0].primitives[0].attributes");
     }
 }

@@ -269,11 +269,10 @@ impl Draft {
         let positions = &self.positions;
         self.triangles.retain(|triangle| {
             let [a, b, c] = triangle.map(|index| positions[index as usize]);
-            let in_range = |p: Vec3A| p.abs().max_element() <= MAX_COORDINATE && !p.is_nan();
             in_range(a) && in_range(b) && in_range(c) && has_area(a, b, c)
         });
         for p in &mut self.positions {
-            if !(p.abs().max_element() <= MAX_COORDINATE) || p.is_nan() {
+            if !in_range(*p) {
                 *p = Vec3A::ZERO;
             }
         }
@@ -339,6 +338,11 @@ impl Draft {
             *uvs = uvs.take().map(|v| pick(&v, order));
         }
     }
+}
+
+/// Whether the renderer can compute with a position.
+fn in_range(p: Vec3A) -> bool {
+    !p.is_nan() && p.abs().max_element() <= MAX_COORDINATE
 }
 
 /// Whether a normal can be computed: in f64 the corners are not on one line, in f32 the cross product is not zero.
