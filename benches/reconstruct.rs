@@ -17,7 +17,7 @@ fn noise(x: usize, y: usize, salt: u64) -> f32 {
 
 fn solvers(c: &mut Criterion) {
     for (width, height) in [(256, 256), (1920, 1080)] {
-        let value = |x: usize, y: usize| if (x / 40 + y / 33) % 2 == 0 { 0.9 } else { 0.2f32 };
+        let value = |x: usize, y: usize| if (x / 40 + y / 33).is_multiple_of(2) { 0.9 } else { 0.2f32 };
         let primal = Plane::from_fn(width, height, |x, y| [value(x, y) + 0.3 * noise(x, y, 1); 3]);
         let difference = |sx: usize, sy: usize, salt: u64| {
             Plane::from_fn(width, height, |x, y| {

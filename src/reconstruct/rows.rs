@@ -76,12 +76,10 @@ impl<'a> Problem<'a> {
                 (y > 0, i.wrapping_sub(w)),
                 (y + 1 < h, i + w),
             ];
-            let mut sum = [0.0; 3];
+            let mut sum = [0.0f32; 3];
             let mut count = 0.0;
             for (_, j) in around.into_iter().filter(|&(inside, j)| inside && self.mask[j] & NO_PRIMAL == 0) {
-                for c in 0..3 {
-                    sum[c] += self.primal.data[j][c];
-                }
+                sum.iter_mut().zip(self.primal.data[j]).for_each(|(s, v)| *s += v);
                 count += 1.0;
             }
             filled.data[i] = if count > 0.0 { sum.map(|s| s / count) } else { [0.0; 3] };
