@@ -22,6 +22,7 @@ pub struct Random {
 }
 
 impl Random {
+    /// A stream of its own for each seed.
     pub fn new(seed: u32) -> Self {
         Self { seed, counter: 0 }
     }
@@ -32,6 +33,7 @@ impl Random {
         (hash(hash(self.seed, 0x7368_6164), self.counter) >> 8) as f32 / (1 << 24) as f32
     }
 
+    /// Sixteen of them.
     pub fn wide(&mut self) -> f32x16 {
         let values: [f32; LANES] = std::array::from_fn(|_| self.float());
         f32x16::new(values)
