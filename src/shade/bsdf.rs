@@ -17,7 +17,7 @@
 //! times |cosθi|, `pdf` in sr⁻¹, for Diracs the coefficient and the probability. Both sides scatter alike, sides
 //! being those of the shading normal; only a solid dielectric knows its inside.
 
-use super::fresnel::{self, SCHLICK_MEAN, schlick, schlick_weight};
+use super::fresnel::{self, Dielectric, SCHLICK_MEAN, schlick, schlick_weight};
 use super::microfacet::{distribution, sample_visible_normal, smith_g1};
 use crate::math::warp::square_to_cosine_hemisphere;
 use crate::math::{Compare, Frame, Mask, Rgb, Vec3x, f32x16, splat};
@@ -255,17 +255,18 @@ impl Bsdf {
     /// Reflected and transmitted shares at a microfacet seen under the cosine `cos` ≥ 0.
     #[inline(always)]
     fn facet(&self, cos: f32x16, eta: f32x16) -> Facet {
-        let one = splat(1.0);
+        let face = fresnel::dielectric(cos, self.solid.select(eta, self.ior));
+        self.facet_of(cos, face)
+    }
+
+    #[inline(always)]
+    fn facet_of(&self, cos: f32x16, face: Dielectric) -> Facet {
         let opaque = schlick(self.f0, self.f90, schlick_weight(cos));
-        if self.clear.simd_gt(f32x16::ZERO).any() {
-            let solid = fresnel::dielectric(cos, self.solid.select(eta, self.ior));
-            let reflected = self.solid.select(solid.reflectance, fresnel::thin(solid.reflectance));
-            let reflect = opaque + Rgb::all(self.clear * reflected);
-            let transmit = self.tint * (one - reflected);
-            let (r, t) = (reflect.luminance(), transmit.luminance());
-            return Facet { reflect, transmit, p_reflect: ratio(r, r + t), cos_t: solid.cos_t };
-        }
-        Facet { reflect: opaque, transmit: Rgb::ZERO, p_reflect: one, cos_t: f32x16::ZERO }
+        let reflected = self.solid.select(face.reflectance, fresnel::thin(face.reflectance));
+        let reflect = opaque + Rgb::all(self.clear * reflected);
+        let transmit = self.tint * (splat(1.0) - reflected);
+        let (r, t) = (reflect.luminance(), transmit.luminance());
+        Facet { reflect, transmit, p_reflect: ratio(r, r + t), cos_t: face.cos_t }
     }
 
     /// World direction of a local one that was seen from `behind`.
@@ -320,7 +321,9 @@ impl Bsdf {
         let (oh, ih) = (wo.dot(h), mirrored.dot(h));
         let facing = oh.gt(zero) & refracted.select(-ih, ih).gt(zero);
 
-        let facet = self.facet(oh, side.eta);
+        let mut face = fresnel::dielectric(oh, self.solid.select(side.eta, self.ior));
+        face.reflectance = refracted.select(fresnel::crossing(oh, ih.abs(), side.eta), face.reflectance);
+        let facet = self.facet_of(oh, face);
         let (g_o, g_i) = (smith_g1(wo.z, self.alpha), smith_g1(cos_i, self.alpha));
         let visible = distribution(h, self.alpha) * g_o / wo.z;
         let denominator = side.eta.mul_add(ih, oh);
