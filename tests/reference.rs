@@ -8,7 +8,7 @@ mod common;
 
 use common::stats::{Estimate, block_means, largest, sidak_threshold, worst, z_scores};
 use exr::prelude::*;
-use gdpt::accel::ObvhsAccel;
+use gdpt::accel::EmbreeAccel;
 use gdpt::film::Half;
 use gdpt::integrate::{self, Kind, Settings};
 use gdpt::scene::{self, Environment};
@@ -86,7 +86,7 @@ fn render(name: &str, reference: &Reference) -> Vec<Vec<[f32; 3]>> {
         scene.environment =
             Some(Environment::load(&sky, 1.0, 0.0, true).unwrap_or_else(|error| panic!("{error}")));
     }
-    let accel = ObvhsAccel::new(&scene).expect("small coordinates");
+    let accel = EmbreeAccel::new(&scene, 0, false, None).expect("a small scene");
     let settings = |seed| Settings {
         kind: Kind::Path,
         width: reference.image.width as u32,
