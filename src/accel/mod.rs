@@ -4,6 +4,13 @@
 //! All backends see the same sanitised meshes and use the same ids: `instance` indexes `Scene::instances`,
 //! `primitive` the triangles of its mesh.
 
+pub mod brute;
+mod flat;
+pub mod obvhs;
+
+pub use brute::BruteAccel;
+pub use obvhs::ObvhsAccel;
+
 use crate::math::{LANES, Mask, Vec3x, f32x16, splat};
 
 /// Sixteen rays; `direction` need not be normalised, distances are in units of its length.
