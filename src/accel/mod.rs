@@ -51,6 +51,18 @@ pub struct Hits {
     pub primitive: [u32; LANES],
 }
 
+impl Hits {
+    /// No lane hit anything.
+    pub const NONE: Self = Self {
+        valid: Mask::NONE,
+        t: f32x16::ZERO,
+        u: f32x16::ZERO,
+        v: f32x16::ZERO,
+        instance: [0; LANES],
+        primitive: [0; LANES],
+    };
+}
+
 /// Whether the rays of a packet start close together and run alike. A hint: it decides speed, never the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coherence {

@@ -12,7 +12,7 @@ use super::wave::Region;
 use super::{Integrator, ShiftOutcome, Statistics, View};
 use crate::accel::Accel;
 use crate::film::{Direction, FilmTile, PixelSample};
-use crate::math::{Mask, Rgb, f32x16, splat};
+use crate::math::{Mask, Permute, Rgb, f32x16, splat};
 use crate::path::tail::{self, Queues, Slot};
 use crate::path::trace::Tracer;
 use crate::shade::Surface;
@@ -29,7 +29,7 @@ fn first_offsets(block: &Block, region: &Region, primary: &Primary, ring: &Prima
         let met = Mask::from_fn(|i| hit[from[i] / 16].get(from[i] % 16));
         let own = exists & met & primary.hits.valid;
         Offset {
-            surface: Surface::permute(&primary.surface, &ring.surface, &from),
+            surface: <Surface as Permute>::permute(&primary.surface, &ring.surface, &from),
             beta: own.keep(Rgb::grey(1.0)),
             ratio: own.keep(splat(1.0)),
             own,

@@ -8,7 +8,6 @@
 
 use super::{ShiftOutcome, View};
 use crate::accel::{Accel, Coherence, Rays};
-use crate::film::Direction;
 use crate::math::{Compare, Mask, Rgb, Vec3x, f32x16, splat};
 use crate::path::bounce::{Bounce, absorption, bounce, light_pdf};
 use crate::path::direct::{self, DirectLight};
@@ -345,7 +344,8 @@ impl Head {
         let radiance = sky.select(next.radiance, next.vertex.emission_towards(-wi));
         out.radiance = lanes.select(radiance, out.radiance);
         out.recent = visible & step.hits.valid;
-        let seen_from_here = Surface { wo: -wi, ..next.vertex };
+        let mut seen_from_here = next.vertex;
+        seen_from_here.wo = -wi;
         out.surface = out.recent.select(seen_from_here, out.surface);
         self.count(ShiftOutcome::Reconnected, visible);
         self.count(ShiftOutcome::Occluded, scatters.and_not(visible));
@@ -453,7 +453,3 @@ fn arrive<A: Accel>(tracer: &Tracer<'_, A>, walk: &Walk<'_>, step: &Bounce) -> N
     next
 }
 
-/// The direction of an index into `Head::offsets`.
-pub fn direction(d: usize) -> Direction {
-    Direction::ALL[d]
-}

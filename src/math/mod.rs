@@ -5,4 +5,4 @@ pub mod sampler;
 pub mod warp;
 pub mod wide;
 
-pub use self::wide::{Compare, Frame, LANES, Mask, Rgb, Select, Vec3x, f32x16, lanes, splat};
+pub use self::wide::{Compare, Frame, LANES, Mask, Permute, Rgb, Select, Vec3x, f32x16, lanes, splat};

@@ -170,6 +170,63 @@ impl Select for [u32; LANES] {
     }
 }
 
+/// What lanes can be picked from, across a pair of packets.
+pub trait Permute: Copy {
+    /// Lane i of the result is lane `from[i]` of `a`, or lane `from[i] − 16` of `b`.
+    fn permute(a: &Self, b: &Self, from: &[usize; LANES]) -> Self;
+}
+
+impl Permute for f32x16 {
+    #[inline(always)]
+    fn permute(a: &Self, b: &Self, from: &[usize; LANES]) -> Self {
+        let (a, b) = (a.as_array(), b.as_array());
+        lanes(|i| if from[i] < LANES { a[from[i] % LANES] } else { b[from[i] % LANES] })
+    }
+}
+
+impl Permute for Mask {
+    #[inline(always)]
+    fn permute(a: &Self, b: &Self, from: &[usize; LANES]) -> Self {
+        Self(f32x16::permute(&a.0, &b.0, from))
+    }
+}
+
+impl<T: Permute, const N: usize> Permute for [T; N] {
+    #[inline(always)]
+    fn permute(a: &Self, b: &Self, from: &[usize; LANES]) -> Self {
+        std::array::from_fn(|i| T::permute(&a[i], &b[i], from))
+    }
+}
+
+impl<T: Select, const N: usize> Select for [T; N] {
+    #[inline(always)]
+    fn select(m: Mask, a: Self, b: Self) -> Self {
+        std::array::from_fn(|i| m.select(a[i], b[i]))
+    }
+}
+
+/// Implements [`Select`] and [`Permute`] for a struct, field by field.
+#[macro_export]
+macro_rules! lanewise {
+    ($type:ty { $($field:ident),+ $(,)? }) => {
+        impl $crate::math::Select for $type {
+            #[inline(always)]
+            fn select(m: $crate::math::Mask, a: Self, b: Self) -> Self {
+                Self { $($field: m.select(a.$field, b.$field)),+ }
+            }
+        }
+        impl $crate::math::Permute for $type {
+            #[inline(always)]
+            fn permute(a: &Self, b: &Self, from: &[usize; $crate::math::LANES]) -> Self {
+                Self { $($field: $crate::math::Permute::permute(&a.$field, &b.$field, from)),+ }
+            }
+        }
+    };
+}
+
+lanewise!(Vec3x { x, y, z });
+lanewise!(Frame { s, t, n });
+
 /// Comparisons of sixteen floats that give a [`Mask`]; false where either side is NaN (`differs`: true).
 pub trait Compare {
     /// `self < o`
@@ -339,13 +396,6 @@ impl Vec3x {
     }
 }
 
-impl Select for Vec3x {
-    #[inline(always)]
-    fn select(m: Mask, a: Self, b: Self) -> Self {
-        Self::new(m.select(a.x, b.x), m.select(a.y, b.y), m.select(a.z, b.z))
-    }
-}
-
 impl Add for Vec3x {
     type Output = Self;
     #[inline(always)]
@@ -437,12 +487,5 @@ impl Frame {
     #[inline(always)]
     pub fn to_world(&self, v: Vec3x) -> Vec3x {
         self.s * v.x + self.t * v.y + self.n * v.z
-    }
-}
-
-impl Select for Frame {
-    #[inline(always)]
-    fn select(m: Mask, a: Self, b: Self) -> Self {
-        Self { s: m.select(a.s, b.s), t: m.select(a.t, b.t), n: m.select(a.n, b.n) }
     }
 }

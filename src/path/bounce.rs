@@ -64,7 +64,7 @@ pub fn bounce<A: Accel>(
     let hits = if active.any() {
         tracer.closest(&rays, active, &segment, Coherence::Incoherent)
     } else {
-        Hits { valid: Mask::NONE, t: f32x16::ZERO, u: f32x16::ZERO, v: f32x16::ZERO, instance: [0; 16], primitive: [0; 16] }
+        Hits::NONE
     };
     sample.f = sample.f * absorption(surface, sample.wi, &hits);
     Bounce { sample, survival, active, segment, hits }

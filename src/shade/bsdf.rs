@@ -20,7 +20,7 @@
 use super::fresnel::{self, SCHLICK_MEAN, schlick, schlick_weight};
 use super::microfacet::{distribution, sample_visible_normal, smith_g1};
 use crate::math::warp::square_to_cosine_hemisphere;
-use crate::math::{Compare, Frame, Mask, Rgb, Select, Vec3x, f32x16, splat};
+use crate::math::{Compare, Frame, Mask, Rgb, Vec3x, f32x16, splat};
 use crate::scene::Material;
 use std::f32::consts::FRAC_1_PI;
 
@@ -417,36 +417,6 @@ impl Bsdf {
     }
 }
 
-impl Select for BsdfSample {
-    #[inline(always)]
-    fn select(m: Mask, a: Self, b: Self) -> Self {
-        Self {
-            wi: m.select(a.wi, b.wi),
-            f: m.select(a.f, b.f),
-            pdf: m.select(a.pdf, b.pdf),
-            dirac: m.select(a.dirac, b.dirac),
-            transmit: m.select(a.transmit, b.transmit),
-            eta: m.select(a.eta, b.eta),
-            valid: m.select(a.valid, b.valid),
-        }
-    }
-}
+crate::lanewise!(BsdfSample { wi, f, pdf, dirac, transmit, eta, valid });
 
-impl Select for Bsdf {
-    #[inline(always)]
-    fn select(m: Mask, a: Self, b: Self) -> Self {
-        Self {
-            frame: m.select(a.frame, b.frame),
-            diffuse: m.select(a.diffuse, b.diffuse),
-            layer: [m.select(a.layer[0], b.layer[0]), m.select(a.layer[1], b.layer[1])],
-            f0: m.select(a.f0, b.f0),
-            f90: m.select(a.f90, b.f90),
-            alpha: m.select(a.alpha, b.alpha),
-            clear: m.select(a.clear, b.clear),
-            tint: m.select(a.tint, b.tint),
-            ior: m.select(a.ior, b.ior),
-            solid: m.select(a.solid, b.solid),
-            absorption: m.select(a.absorption, b.absorption),
-        }
-    }
-}
+crate::lanewise!(Bsdf { frame, diffuse, layer, f0, f90, alpha, clear, tint, ior, solid, absorption });

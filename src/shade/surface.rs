@@ -5,7 +5,7 @@
 
 use super::{Bsdf, Parameters, ShadeScene, corners, offset_bound};
 use crate::accel::Hits;
-use crate::math::{Compare, Frame, LANES, Mask, Rgb, Select, Vec3x, f32x16, splat};
+use crate::math::{Compare, Frame, LANES, Mask, Rgb, Vec3x, f32x16, splat};
 use crate::scene::{AlphaMode, Material, Mesh};
 use glam::{Vec2, Vec3, Vec4};
 
@@ -22,6 +22,10 @@ pub struct Surface {
     pub bsdf: Bsdf,
     /// Radiance towards `wo`; unlit surfaces show their base colour.
     pub emission: Rgb,
+    /// Radiance of the side that emits, whichever side `wo` is on.
+    emitted: Rgb,
+    /// Both sides emit.
+    two_sided: Mask,
     /// On an emissive or unlit surface, whichever side.
     pub is_emitter: Mask,
     /// Area pdf with which light sampling picks this point, m⁻²; 0 where it never does.
@@ -297,18 +301,28 @@ impl Surface {
         let base = g.base.wide();
         let frame = Frame::from_normal(g.shading_normal(ng));
         let bsdf = unlit.select(Bsdf::black(frame), Bsdf::new(frame, &g.parameters(base)));
-        let lit_side = wo.dot(ng).gt(f32x16::ZERO) | Mask::from_bits(g.bits.two_sided);
+        let two_sided = Mask::from_bits(g.bits.two_sided);
+        let lit_side = wo.dot(ng).gt(f32x16::ZERO) | two_sided;
+        let emitted = g.emission.wide();
         active.keep(Self {
             p,
             ng,
             wo,
             bsdf,
-            emission: lit_side.keep(g.emission.wide()),
+            emission: lit_side.keep(emitted),
+            emitted,
+            two_sided,
             is_emitter: Mask::from_bits(g.bits.emitter),
             light_pdf: f32x16::new(g.light_pdf),
             albedo: base,
             offset: f32x16::new(g.offset),
         })
+    }
+
+    /// Radiance towards `w`.
+    #[inline(always)]
+    pub fn emission_towards(&self, w: Vec3x) -> Rgb {
+        (w.dot(self.ng).gt(f32x16::ZERO) | self.two_sided).keep(self.emitted)
     }
 
     /// Origin of a ray that leaves towards `w`: `p`, moved off the surface on the side of `w` beyond its rounding.
@@ -319,19 +333,4 @@ impl Surface {
     }
 }
 
-impl Select for Surface {
-    #[inline(always)]
-    fn select(m: Mask, a: Self, b: Self) -> Self {
-        Self {
-            p: m.select(a.p, b.p),
-            ng: m.select(a.ng, b.ng),
-            wo: m.select(a.wo, b.wo),
-            bsdf: m.select(a.bsdf, b.bsdf),
-            emission: m.select(a.emission, b.emission),
-            is_emitter: m.select(a.is_emitter, b.is_emitter),
-            light_pdf: m.select(a.light_pdf, b.light_pdf),
-            albedo: m.select(a.albedo, b.albedo),
-            offset: m.select(a.offset, b.offset),
-        }
-    }
-}
+crate::lanewise!(Surface { p, ng, wo, bsdf, emission, emitted, two_sided, is_emitter, light_pdf, albedo, offset });
