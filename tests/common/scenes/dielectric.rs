@@ -85,7 +85,7 @@ pub fn light_behind_glass() -> TestScene {
     let mut b = Builder::default();
     b.quad(v(-2.0, 0.0, -2.0), v(0.0, 0.0, 4.0), v(4.0, 0.0, 0.0), diffuse(0.6, 0.6, 0.6));
     b.cuboid(v(-0.6, 0.1, 0.0), v(0.6, 1.0, 0.2), glass(1.5, 0.0));
-    b.quad(v(-0.5, 0.2, -0.8), v(0.9, 0.0, 0.1), v(0.0, 0.7, 0.0), emitter(v(2.0, 3.0, 4.0)));
+    b.quad(v(-1.1, 0.1, -0.8), v(1.9, 0.0, 0.2), v(0.0, 1.4, 0.0), emitter(v(2.0, 3.0, 4.0)));
     TestScene::new("light_behind_glass", b.scene, view(), 5)
 }
 

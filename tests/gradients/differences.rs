@@ -2,13 +2,11 @@
 //! over K independent seeds, pixel by pixel, summed over blocks, rows and columns, on average over the image, and as
 //! the slope of a regression, which a wrong scale would turn away from 1. The noise of the reference is in every z.
 //!
-//! `GDPT_TEST_SEED` adds to all seeds: to tell a bug from a tail of the distribution.
+//! `GDPT_TEST_SEED` adds to all seeds and `GDPT_TEST_SCALE` multiplies the samples, to tell a bug from a tail.
 
-mod common;
-
-use common::scenes::{self, TestScene};
-use common::stats::{Estimate, Runs, slope, z_score};
-use common::{accel, differences, gradients, pairs, render, settings};
+use super::common::scenes::{self, TestScene};
+use super::common::stats::{Estimate, Runs, slope, z_score};
+use super::common::{Pair, accel, differences, gradients, pairs, render, settings};
 use gdpt::film::Half;
 use gdpt::integrate::{Kind, ShiftOutcome, Statistics};
 use std::time::Instant;
@@ -61,8 +59,28 @@ fn judge(scene: &TestScene, tested: &Runs, truth: &Runs) -> Verdict {
     Verdict { outside, worst, mean: z_of(&weights), worst_sum, slope: slope(tested, truth) }
 }
 
-fn seed_offset() -> u64 {
-    std::env::var("GDPT_TEST_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(0)
+/// The entries out of bounds, in words.
+fn outliers(scene: &TestScene, tested: &Runs, truth: &Runs) -> Vec<String> {
+    let [width, height] = scene.size.map(|n| n as usize);
+    let describe = |(i, pair): (usize, Pair)| {
+        (0..3).filter_map(move |c| {
+            let (g, r) = (tested.entry(3 * i + c), truth.entry(3 * i + c));
+            let z = z_score(g, r, 0.0);
+            let [sigma_g, sigma_r] = [g.variance.sqrt(), r.variance.sqrt()];
+            (z.abs() >= Z).then(|| {
+                format!(
+                    "{pair:?} channel {c}: {:.6} ± {sigma_g:.6}, expected {:.6} ± {sigma_r:.6}, z {z:.2}",
+                    g.mean, r.mean
+                )
+            })
+        })
+    };
+    pairs(width, height).enumerate().flat_map(describe).collect()
+}
+
+/// A number from the environment.
+fn variable(name: &str) -> Option<u32> {
+    std::env::var(name).ok().and_then(|s| s.parse().ok())
 }
 
 fn shares(shifts: &[u64; ShiftOutcome::COUNT]) -> String {
@@ -76,12 +94,13 @@ fn measure(scene: &TestScene) -> (Runs, Runs, Statistics) {
     let accel = accel(scene);
     let (mut tested, mut truth) = (Runs::default(), Runs::default());
     let mut statistics = Statistics::default();
-    for seed in 0..SEEDS {
-        let seed = seed + seed_offset();
-        let (film, done) = render(scene, &accel, &settings(scene, Kind::GradientPath, seed, scene.spp));
+    let scale = variable("GDPT_TEST_SCALE").unwrap_or(1);
+    let first = u64::from(variable("GDPT_TEST_SEED").unwrap_or(0));
+    for seed in first..first + SEEDS {
+        let (film, done) = render(scene, &accel, &settings(scene, Kind::GradientPath, seed, scale * scene.spp));
         tested.push(&gradients(&film));
         statistics.add(&done);
-        let reference = settings(scene, Kind::Path, seed + 1_000_000, scene.reference_spp);
+        let reference = settings(scene, Kind::Path, seed + 1_000_000, scale * scene.reference_spp);
         truth.push(&differences(&render(scene, &accel, &reference).0.primal(Half::Both)));
     }
     (tested, truth, statistics)
@@ -105,6 +124,9 @@ fn check(scene: TestScene) {
         start.elapsed().as_secs_f64(),
     );
     println!("{report}");
+    for line in outliers(&scene, &tested, &truth) {
+        println!("    {line}");
+    }
     let allowed = (tested.len() / 3).div_ceil(10_000);
     assert!(v.outside <= allowed, "single differences are wrong: {report}");
     assert!(v.mean.abs() < Z, "the differences are wrong on average: {report}");
@@ -115,7 +137,7 @@ fn check(scene: TestScene) {
 /// One test a scene: its gradients (T2), and its primal against the path tracer's bits (T1).
 macro_rules! scene_tests {
     ($($name:ident),+ $(,)?) => {
-        mod differences_of {
+        mod of {
             $(#[test]
             fn $name() {
                 super::check(super::scenes::$name());
