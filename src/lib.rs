@@ -7,10 +7,12 @@
 #![forbid(unsafe_code)]
 
 pub mod accel;
+pub mod analyze;
 pub mod error;
 pub mod film;
 pub mod integrate;
 pub mod math;
 pub mod path;
+pub mod reconstruct;
 pub mod scene;
 pub mod shade;

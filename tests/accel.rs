@@ -4,7 +4,7 @@
 //! interval, or between two surfaces at the same distance. How far "at" reaches follows from f32's precision, the
 //! distance and the angle of incidence.
 
-use gdpt::accel::{Accel, BruteAccel, Coherence, Hits, ObvhsAccel, Rays, Visible};
+use gdpt::accel::{Accel, BruteAccel, Coherence, EmbreeAccel, Hits, ObvhsAccel, Rays, Visible};
 use gdpt::error::Result;
 use gdpt::math::sampler::hash;
 use gdpt::math::{LANES, Mask, Vec3x, lanes, splat};
@@ -15,9 +15,11 @@ use glam::{Affine3A, DVec3, Quat, Vec3, Vec3A};
 type Build = fn(&Scene) -> Result<Box<dyn Accel>>;
 
 /// The backends under test, each with its name.
-const BACKENDS: [(&str, Build); 2] = [
+const BACKENDS: [(&str, Build); 4] = [
     ("brute", |scene| Ok(Box::new(BruteAccel::new(scene)?))),
     ("obvhs", |scene| Ok(Box::new(ObvhsAccel::new(scene)?))),
+    ("embree", |scene| Ok(Box::new(EmbreeAccel::new(scene, 2, false, None)?))),
+    ("robust embree", |scene| Ok(Box::new(EmbreeAccel::new(scene, 2, true, None)?))),
 ];
 
 const HINTS: [Coherence; 2] = [Coherence::Coherent, Coherence::Incoherent];

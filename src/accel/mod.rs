@@ -5,10 +5,12 @@
 //! `primitive` the triangles of its mesh.
 
 pub mod brute;
+pub mod embree;
 mod flat;
 pub mod obvhs;
 
 pub use brute::BruteAccel;
+pub use embree::EmbreeAccel;
 pub use obvhs::ObvhsAccel;
 
 use crate::math::{LANES, Mask, Vec3x, f32x16, splat};

@@ -3,14 +3,71 @@
 //!
 //! World space is glTF's: right-handed, y up, metres. Colours are linear Rec.709.
 
+mod accessor;
+mod budget;
+mod builtin;
 pub mod camera;
+mod container;
+mod describe;
+mod document;
 pub mod environment;
+mod fit;
+mod geometry;
+mod gltf_reader;
+mod lights;
+mod material;
+mod nodes;
+mod raw;
+mod references;
+mod tangents;
+mod texture;
+mod uri;
+mod validate;
 
+use crate::error::Result;
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec3A, Vec4};
+use std::path::Path;
 use std::sync::Arc;
 
+pub use builtin::{BUILTIN_NAMES, builtin};
 pub use camera::{Camera, Projection};
+pub use describe::describe;
 pub use environment::Environment;
+pub use fit::fitted_camera;
+
+/// How a scene is read.
+#[derive(Clone, Debug)]
+pub struct LoadOptions {
+    /// Unit of the file's punctual lights.
+    pub light_unit: LightUnit,
+    /// Bytes that the file, its decoded images and its geometry may take.
+    pub max_memory: u64,
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self { light_unit: LightUnit::Auto, max_memory: 8 << 30 }
+    }
+}
+
+/// Unit of the intensities of punctual lights. Emissive materials are radiance in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightUnit {
+    /// Candela and lux, as the specification says: divided by 683 lm·W⁻¹.
+    Photometric,
+    /// W·sr⁻¹ and W·m⁻², as many exporters write.
+    Radiometric,
+    /// Photometric where `asset.generator` names Blender, which converts watts by 683 lm·W⁻¹; else radiometric.
+    #[default]
+    Auto,
+}
+
+/// Reads a .glb or .gltf file.
+///
+/// What can be repaired is, with a warning in [`Scene::report`]; what cannot is an error that names its place.
+pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    gltf_reader::read(path, options)
+}
 
 /// Everything that is rendered.
 #[derive(Clone, Debug, Default)]
@@ -55,6 +112,10 @@ pub struct Mesh {
 }
 
 /// A placement of a mesh.
+///
+/// A mirroring (negative determinant) keeps the mesh's winding as it is in object space. Its front stays the front
+/// if the geometric normal is taken from object space by the inverse transpose; a normal computed from edges in
+/// world space has to be multiplied by the sign of the determinant, and so has the bitangent cross(n, t)·w.
 #[derive(Clone, Copy, Debug)]
 pub struct Instance {
     /// Index into `Scene::meshes`.
@@ -121,6 +182,34 @@ impl Material {
     /// Whether a ray may pass where alpha says so.
     pub fn has_coverage(&self) -> bool {
         self.alpha_mode != AlphaMode::Opaque
+    }
+
+    /// Every texture in use.
+    pub fn texture_refs(&self) -> impl Iterator<Item = &TextureRef> {
+        [
+            &self.base_color_texture,
+            &self.metallic_roughness_texture,
+            &self.normal_texture,
+            &self.emission_texture,
+            &self.specular_texture,
+            &self.specular_color_texture,
+            &self.transmission_texture,
+        ]
+        .into_iter()
+        .flatten()
+    }
+
+    /// Every place for a texture.
+    fn texture_slots(&mut self) -> [&mut Option<TextureRef>; 7] {
+        [
+            &mut self.base_color_texture,
+            &mut self.metallic_roughness_texture,
+            &mut self.normal_texture,
+            &mut self.emission_texture,
+            &mut self.specular_texture,
+            &mut self.specular_color_texture,
+            &mut self.transmission_texture,
+        ]
     }
 
     /// Whether triangles of this material are area lights.
@@ -255,7 +344,42 @@ pub struct LoadReport {
     pub generator: String,
 }
 
+impl LoadReport {
+    /// Lines that are kept: what a file can say a million times is not worth more.
+    const MAX_WARNINGS: usize = 200;
+
+    /// Adds a line, once.
+    pub fn warn(&mut self, line: String) {
+        if self.warnings.len() < Self::MAX_WARNINGS {
+            if !self.warnings.contains(&line) {
+                self.warnings.push(line);
+            }
+        } else if self.warnings.len() == Self::MAX_WARNINGS {
+            self.warnings.push("more warnings are not shown".into());
+        }
+    }
+
+    /// Adds what another report says of a part of the same file.
+    fn absorb(&mut self, part: LoadReport) {
+        self.dropped_triangles += part.dropped_triangles;
+        self.missing_textures += part.missing_textures;
+        for line in part.warnings {
+            self.warn(line);
+        }
+    }
+}
+
 impl Scene {
+    /// Whether anything emits light that a path can find: without, the image is black.
+    pub fn has_light(&self) -> bool {
+        let emits = |i: &Instance| {
+            let mesh = self.meshes.get(i.mesh as usize);
+            let material = mesh.and_then(|m| self.materials.get(m.material as usize));
+            material.is_some_and(|m| m.is_emissive() || m.unlit)
+        };
+        self.environment.is_some() || !self.lights.is_empty() || self.instances.iter().any(emits)
+    }
+
     /// Triangles over all instances.
     pub fn triangle_count(&self) -> u64 {
         self.instances.iter().map(|i| self.meshes[i.mesh as usize].triangles.len() as u64).sum()

@@ -1,0 +1,2 @@
+//! Measures of error between images.
+pub mod metrics;

@@ -1,0 +1,174 @@
+//! The rows of the problem: which are measured, and what the differences say beyond the primal.
+//!
+//! All solvers look for y = x − g, the correction of the primal. Its data are the residuals of the primal,
+//! ex = dx − Dx g and ey = dy − Dy g, so consistent data give y = 0 exactly and rounding scales with the noise, not
+//! with the image. A field is one value a channel and pixel, row y being R, G, B one after the other (3 W values).
+
+use super::dct::{Real, real};
+use super::{Input, LIMIT};
+use crate::film::Plane;
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+/// Rows of pixels a parallel task works on.
+pub(crate) const BAND: usize = 16;
+
+/// Bits of [`Problem::mask`]: which rows of a pixel have no measurement.
+pub(crate) const NO_PRIMAL: u8 = 1;
+/// The difference to the right is missing.
+pub(crate) const NO_DX: u8 = 2;
+/// The difference downwards is missing.
+pub(crate) const NO_DY: u8 = 4;
+
+/// The input with its missing rows found and the primal's holes filled.
+pub(crate) struct Problem<'a> {
+    pub width: usize,
+    pub height: usize,
+    /// The primal, finite everywhere.
+    pub primal: Cow<'a, Plane>,
+    dx: &'a Plane,
+    dy: &'a Plane,
+    /// Missing rows of each pixel; empty where nothing is missing.
+    pub mask: Vec<u8>,
+    pub missing: usize,
+}
+
+fn measured(v: &[f32; 3]) -> bool {
+    v.iter().all(|v| v.abs() <= LIMIT)
+}
+
+impl<'a> Problem<'a> {
+    pub fn new(input: &Input<'a>) -> Self {
+        let (width, height) = (input.primal.width, input.primal.height);
+        let bits = |i: usize| {
+            let (inside_x, inside_y) = (i % width + 1 < width, i / width + 1 < height);
+            u8::from(!measured(&input.primal.data[i])) * NO_PRIMAL
+                + u8::from(inside_x && !measured(&input.dx.data[i])) * NO_DX
+                + u8::from(inside_y && !measured(&input.dy.data[i])) * NO_DY
+        };
+        let missing = (0..width * height).into_par_iter().map(|i| bits(i).count_ones() as usize).sum();
+        let mut problem = Self {
+            width,
+            height,
+            primal: Cow::Borrowed(input.primal),
+            dx: input.dx,
+            dy: input.dy,
+            mask: Vec::new(),
+            missing,
+        };
+        if missing > 0 {
+            problem.mask = (0..width * height).map(bits).collect();
+            problem.fill_holes();
+        }
+        problem
+    }
+
+    /// Gives pixels without a primal the mean of their measured neighbours, or zero. Their row has no weight, so the
+    /// value is only where the solvers start from.
+    fn fill_holes(&mut self) {
+        let (w, h) = (self.width, self.height);
+        let mut filled = self.primal.as_ref().clone();
+        for i in (0..w * h).filter(|&i| self.mask[i] & NO_PRIMAL != 0) {
+            let (x, y) = (i % w, i / w);
+            let around = [(x > 0, i.wrapping_sub(1)), (x + 1 < w, i + 1), (y > 0, i.wrapping_sub(w)), (y + 1 < h, i + w)];
+            let mut sum = [0.0; 3];
+            let mut count = 0.0;
+            for (_, j) in around.into_iter().filter(|&(inside, j)| inside && self.mask[j] & NO_PRIMAL == 0) {
+                for c in 0..3 {
+                    sum[c] += self.primal.data[j][c];
+                }
+                count += 1.0;
+            }
+            filled.data[i] = if count > 0.0 { sum.map(|s| s / count) } else { [0.0; 3] };
+        }
+        self.primal = Cow::Owned(filled);
+    }
+
+    /// Values of a row of a field.
+    pub fn stride(&self) -> usize {
+        3 * self.width
+    }
+
+    /// Writes the residuals of the primal in pixel row `y`: `ex` and `ey`, zero where missing or outside.
+    pub fn residuals<T: Real>(&self, y: usize, ex: &mut [T], ey: &mut [T]) {
+        let w = self.width;
+        let here = &self.primal.data[y * w..(y + 1) * w];
+        let dx = &self.dx.data[y * w..(y + 1) * w];
+        let difference = |d: f32, a: f32, b: f32| real::<T>(f64::from(d) - (f64::from(b) - f64::from(a)));
+        for c in 0..3 {
+            for x in 0..w - 1 {
+                ex[c * w + x] = difference(dx[x][c], here[x][c], here[x + 1][c]);
+            }
+            ex[c * w + w - 1] = T::zero();
+        }
+        if y + 1 < self.height {
+            let below = &self.primal.data[(y + 1) * w..(y + 2) * w];
+            let dy = &self.dy.data[y * w..(y + 1) * w];
+            for c in 0..3 {
+                for x in 0..w {
+                    ey[c * w + x] = difference(dy[x][c], here[x][c], below[x][c]);
+                }
+            }
+        } else {
+            ey.fill(T::zero());
+        }
+        if !self.mask.is_empty() {
+            for x in 0..w {
+                for c in 0..3 {
+                    if self.mask[y * w + x] & NO_DX != 0 {
+                        ex[c * w + x] = T::zero();
+                    }
+                    if self.mask[y * w + x] & NO_DY != 0 {
+                        ey[c * w + x] = T::zero();
+                    }
+                }
+            }
+        }
+    }
+
+    /// `weight` · Dᵀ e: the right-hand side of the unweighted problem.
+    pub fn divergence<T: Real>(&self, weight: f64) -> Vec<T> {
+        let (w, stride) = (self.width, self.stride());
+        let weight = real::<T>(weight);
+        let mut field = vec![T::zero(); stride * self.height];
+        if field.is_empty() {
+            return field;
+        }
+        field.par_chunks_mut(BAND * stride).enumerate().for_each(|(band, rows)| {
+            let zero = || vec![T::zero(); stride];
+            let (mut ex, mut ey, mut above) = (zero(), zero(), zero());
+            if band > 0 {
+                self.residuals(band * BAND - 1, &mut ex, &mut above);
+            }
+            for (i, row) in rows.chunks_exact_mut(stride).enumerate() {
+                self.residuals(band * BAND + i, &mut ex, &mut ey);
+                for ((out, ex), (ey, above)) in
+                    row.chunks_exact_mut(w).zip(ex.chunks_exact(w)).zip(ey.chunks_exact(w).zip(above.chunks_exact(w)))
+                {
+                    out[0] = weight * (above[0] - ey[0] - ex[0]);
+                    for x in 1..w {
+                        out[x] = weight * (above[x] - ey[x] + (ex[x - 1] - ex[x]));
+                    }
+                }
+                std::mem::swap(&mut ey, &mut above);
+            }
+        });
+        field
+    }
+
+    /// The image g + y.
+    pub fn image(&self, correction: &[f32]) -> Plane {
+        let w = self.width;
+        let mut image = self.primal.as_ref().clone();
+        if w > 0 {
+            image.data.par_chunks_mut(w).zip(correction.par_chunks(3 * w)).for_each(|(pixels, row)| {
+                for (x, pixel) in pixels.iter_mut().enumerate() {
+                    for c in 0..3 {
+                        pixel[c] += row[c * w + x];
+                    }
+                }
+            });
+        }
+        image
+    }
+}
