@@ -4,9 +4,10 @@
 //! significantly (α = 0.01 over all blocks and channels, both standard errors taken into account); nor does the whole
 //! image in any channel (|z| < 4). The block test must notice our own image with one percent of its light taken away.
 
-mod common;
+#[path = "common/stats.rs"]
+mod stats;
 
-use common::stats::{Estimate, block_means, largest, sidak_threshold, worst, z_scores};
+use crate::stats::{Estimate, block_means, largest, sidak_threshold, worst, z_scores};
 use exr::prelude::*;
 use gdpt::accel::EmbreeAccel;
 use gdpt::film::Half;

@@ -1,8 +1,9 @@
 //! The statistics that other tests rely on, held against tables and against noise of known spread.
 
-mod common;
+#[path = "common/stats.rs"]
+mod stats;
 
-use common::stats::{Estimate, block_means, largest, normal_of_t, sidak_threshold, worst, z_scores};
+use crate::stats::{Estimate, block_means, largest, normal_of_t, sidak_threshold, worst, z_scores};
 use gdpt::math::sampler::hash;
 
 /// Sum of twelve hashed uniforms: near enough to normal, mean 0, variance 1.
