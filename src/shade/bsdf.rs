@@ -59,7 +59,7 @@ pub struct Bsdf {
     /// Schlick's reflectances of metal and layer together, weights applied.
     f0: Rgb,
     f90: f32x16,
-    /// GGX alpha of the specular lobes; 0 is Dirac.
+    /// GGX alpha of the specular lobes; 0 where they are Diracs or there is none.
     alpha: f32x16,
     /// Weight of the transmissive dielectric.
     clear: f32x16,
@@ -154,19 +154,21 @@ impl Bsdf {
         // Where indices match, no microfacet deflects: the transmission is a Dirac at any roughness.
         let matched = p.solid & p.ior.same(one) & clear.gt(f32x16::ZERO);
         let smooth = alpha.lt(splat(Material::SMOOTH_ALPHA)) | matched;
-        Self {
+        let mut bsdf = Self {
             frame,
             diffuse: p.base * ratio(opaque, one - mean),
             layer: [layer_f0, p.specular],
             f0,
             f90,
-            alpha: smooth.select(f32x16::ZERO, alpha),
+            alpha: f32x16::ZERO,
             clear,
             tint: p.base * clear,
             ior: closed.select(one, p.ior),
             solid: p.solid,
             absorption: p.solid.keep(p.absorption),
-        }
+        };
+        bsdf.alpha = bsdf.has_specular().and_not(smooth).keep(alpha);
+        bsdf
     }
 
     /// A frame that scatters nothing.
@@ -184,7 +186,7 @@ impl Bsdf {
     /// Lanes with a Lambertian or rough lobe.
     #[inline(always)]
     pub fn has_smooth(&self) -> Mask {
-        !self.diffuse.is_zero() | (self.has_specular() & self.alpha.gt(f32x16::ZERO))
+        !self.diffuse.is_zero() | self.alpha.gt(f32x16::ZERO)
     }
 
     /// Lanes with a Dirac lobe.
@@ -196,7 +198,7 @@ impl Bsdf {
     /// Smallest GGX alpha over the smooth lobes: infinite where there is only Lambert, 0 where there is none.
     #[inline(always)]
     pub fn smooth_alpha(&self) -> f32x16 {
-        let rough = self.has_specular() & self.alpha.gt(f32x16::ZERO);
+        let rough = self.alpha.gt(f32x16::ZERO);
         let lambert = (!self.diffuse.is_zero()).keep(splat(f32::INFINITY));
         rough.select(self.alpha, lambert)
     }
@@ -271,7 +273,7 @@ impl Bsdf {
 
     /// World direction of a local one that was seen from `behind`.
     #[inline(always)]
-    fn to_world(&self, behind: Mask, w: Vec3x) -> Vec3x {
+    fn outward(&self, behind: Mask, w: Vec3x) -> Vec3x {
         self.frame.to_world(Vec3x::new(w.x, w.y, behind.select(-w.z, w.z)))
     }
 
@@ -360,7 +362,7 @@ impl Bsdf {
         let pdf = (one - side.p_diffuse) * p;
         let zero = f32x16::ZERO;
         let valid = self.has_dirac() & wo.z.gt(zero) & pdf.gt(zero) & f.max_component().gt(zero);
-        DiracEval { wi: self.to_world(side.behind, wi), f: valid.keep(f), pdf: valid.keep(pdf), eta, valid }
+        DiracEval { wi: self.outward(side.behind, wi), f: valid.keep(f), pdf: valid.keep(pdf), eta, valid }
     }
 
     /// Samples a direction: `u_lobe` chooses the lobe, (u, v) the direction within it, all in [0, 1).
@@ -371,10 +373,13 @@ impl Bsdf {
         let wo = side.wo;
         let diffuse = u_lobe.lt(side.p_diffuse);
         let dirac = self.has_dirac().and_not(diffuse);
-        let rough = active.and_not(diffuse | dirac);
+        let rough = (active & self.alpha.gt(zero)).and_not(diffuse);
         let rest = (u_lobe - side.p_diffuse) / (one - side.p_diffuse);
 
-        let mut wi = square_to_cosine_hemisphere(u, v);
+        let mut wi = Vec3x::ZERO;
+        if (active & diffuse).any() {
+            wi = diffuse.keep(square_to_cosine_hemisphere(u, v));
+        }
         let mut transmit = Mask::NONE;
         if rough.any() {
             let h = sample_visible_normal(wo, self.alpha, u, v);
@@ -389,7 +394,7 @@ impl Bsdf {
         }
         // A microfacet may send light to the wrong side of the surface; single scattering loses it.
         let kept = transmit.select(wi.z.lt(zero), wi.z.gt(zero));
-        let wi = self.to_world(side.behind, wi);
+        let wi = self.outward(side.behind, wi);
         let (f, pdf) = self.eval_side(&side, wi);
         let valid = active & kept & pdf.gt(zero);
         let mut sample = BsdfSample {

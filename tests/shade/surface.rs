@@ -151,7 +151,7 @@ fn emission_leaves_the_front_or_both_sides() {
         assert_eq!(below.emission.lane(1), back);
         assert!(above.is_emitter.all() && below.is_emitter.all());
         assert_eq!(above.light_pdf.as_array()[0] > 0.0, sampled);
-        assert_eq!(above.bsdf.has_smooth().any(), false);
+        assert!(above.bsdf.has_smooth().none());
     }
     let dark = one_square(matte(), Affine3A::IDENTITY);
     let s = surface(&dark, 0, 0.2, 0.2, Vec3::Z);
