@@ -1,24 +1,19 @@
 //! The program as a user runs it: real processes in private folders. Every failure is one line on stderr with the
 //! exit status of the README, leaves no hidden file, and does not touch a file that was there.
 
+mod process;
+
 use assert_cmd::cargo::cargo_bin;
 use gdpt::store::{Document, exr};
+use process::{assert_no_hidden_files, assert_refused, folder, stderr};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
-use tempfile::TempDir;
 
+/// Runs the program in `folder`.
 fn gdpt(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(cargo_bin!("gdpt"));
     command.current_dir(folder).args(arguments).stdin(Stdio::null()).output().expect("the program starts")
-}
-
-fn folder() -> TempDir {
-    tempfile::tempdir().expect("a private folder")
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// Renders the built-in box, small, and asserts success.
@@ -30,27 +25,6 @@ fn render(folder: &Path, more: &[&str]) {
     arguments.extend(more);
     let output = gdpt(folder, &arguments);
     assert!(output.status.success() && output.stderr.is_empty(), "{more:?}: {}", stderr(&output));
-}
-
-/// Asserts a failure with `status`, whose one line of error contains `words`.
-fn assert_refused(output: &Output, status: i32, words: &[&str], what: &str) {
-    let text = stderr(output);
-    assert_eq!(output.status.code(), Some(status), "{what}: {text}");
-    let errors: Vec<&str> = text.lines().filter(|l| !l.starts_with("gdpt: warning: ")).collect();
-    assert!(
-        errors.len() == 1 && errors[0].starts_with("gdpt: error: "),
-        "{what}: not one line of error: {text}"
-    );
-    for word in words {
-        assert!(errors[0].contains(word), "{what}: {word:?} is not in {text}");
-    }
-}
-
-fn assert_no_hidden_files(folder: &Path) {
-    for entry in fs::read_dir(folder).expect("the private folder") {
-        let name = entry.expect("readable").file_name();
-        assert!(!name.to_string_lossy().ends_with(".part"), "{name:?} was left behind");
-    }
 }
 
 fn read(folder: &Path, name: &str) -> Document {
@@ -430,81 +404,4 @@ fn too_little_memory_is_status_33() {
         &["render", "builtin:cornell-box", "-o", "a.exr", "--size", "4096x4096", "--max-memory", "64M"],
     );
     assert_refused(&output, 33, &["4096x4096", "64 MiB"], "film");
-}
-
-#[cfg(unix)]
-mod unix {
-    use super::*;
-    use std::io::{BufRead, BufReader, Read};
-    use std::os::unix::process::ExitStatusExt;
-
-    #[test]
-    fn a_full_disk_is_status_74_and_keeps_the_old_files() {
-        let folder = folder();
-        let path = folder.path();
-        for (name, size) in [("old.exr", "64x64"), ("old.png", "8x8")] {
-            fs::write(path.join(name), b"old").expect("writable");
-            // No file may grow at all, as on a disk without a free block.
-            let script = "ulimit -f 0; exec \"$0\" \"$@\"";
-            let output = Command::new("sh")
-                .current_dir(path)
-                .args(["-c", script])
-                .arg(cargo_bin!("gdpt"))
-                .args(["render", "builtin:cornell-box", "--spp", "1", "--size", size, "-o", name, "-q"])
-                .output()
-                .expect("a shell");
-            assert_refused(&output, 74, &[name], name);
-            assert_eq!(fs::read(path.join(name)).expect("still there"), b"old");
-        }
-        assert_no_hidden_files(path);
-    }
-
-    #[test]
-    fn signals_end_it_and_write_nothing() {
-        for (signal, status) in [("INT", 130), ("TERM", 143)] {
-            let folder = folder();
-            let path = folder.path();
-            fs::write(path.join("old.exr"), b"old").expect("writable");
-            let mut child = Command::new(cargo_bin!("gdpt"))
-                .current_dir(path)
-                .args(["render", "builtin:cornell-box", "-o", "old.exr", "--spp", "10000000"])
-                .args(["--progress", "json"])
-                .stderr(Stdio::piped())
-                .stdout(Stdio::null())
-                .spawn()
-                .expect("the program starts");
-            let mut lines = BufReader::new(child.stderr.take().expect("piped"));
-            let mut line = String::new();
-            while !line.contains("\"render\"") {
-                line.clear();
-                assert!(lines.read_line(&mut line).expect("text") > 0, "it ended before it rendered");
-            }
-            let kill = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).status();
-            assert!(kill.expect("kill is there").success());
-            let mut rest = String::new();
-            lines.read_to_string(&mut rest).expect("text");
-            let ended = child.wait().expect("it ends");
-            assert_eq!((ended.code(), ended.signal()), (Some(status), None), "{rest}");
-            assert!(rest.contains("gdpt: error: interrupted"), "{rest}");
-            assert_eq!(fs::read(path.join("old.exr")).expect("still there"), b"old");
-            assert_no_hidden_files(path);
-        }
-    }
-
-    #[test]
-    fn a_closed_pipe_is_no_panic() {
-        let folder = folder();
-        for arguments in [&["info", "builtin:cornell-box"][..], &["render", "--help"]] {
-            let mut child = Command::new(cargo_bin!("gdpt"))
-                .current_dir(folder.path())
-                .args(arguments)
-                .stdout(Stdio::piped())
-                .stderr(Stdio::piped())
-                .spawn()
-                .expect("the program starts");
-            drop(child.stdout.take());
-            let output = child.wait_with_output().expect("it ends");
-            assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        }
-    }
 }

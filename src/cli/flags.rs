@@ -397,7 +397,7 @@ impl RenderFlags {
             LightUnitFlag::Radiometric => LightUnit::Radiometric,
             LightUnitFlag::Auto => LightUnit::Auto,
         };
-        let defaults = LoadOptions::default();
-        LoadOptions { light_unit, max_memory: self.max_memory.unwrap_or(defaults.max_memory), ..defaults }
+        let max_memory = self.max_memory.unwrap_or(LoadOptions::default().max_memory);
+        LoadOptions { light_unit, max_memory }
     }
 }

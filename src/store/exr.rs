@@ -43,17 +43,18 @@ pub fn encode(document: &Document) -> std::io::Result<Vec<u8>> {
         AnyChannel::new(text(name), FlatSamples::F32(samples.clone()))
     };
     let channels = AnyChannels::sort(document.channels.iter().map(channel).collect());
-    let mut attributes = LayerAttributes::default();
-    attributes.software_name = Some(text(concat!("gdpt ", env!("CARGO_PKG_VERSION"))));
-    attributes.world_to_camera = document.world_to_camera;
-    attributes.world_to_normalized_device = document.world_to_ndc;
+    let mut attributes = LayerAttributes {
+        software_name: Some(text(concat!("gdpt ", env!("CARGO_PKG_VERSION")))),
+        world_to_camera: document.world_to_camera,
+        world_to_normalized_device: document.world_to_ndc,
+        ..LayerAttributes::default()
+    };
     for (name, value) in &document.attributes {
         attributes.other.insert(text(name), AttributeValue::Text(text(value)));
     }
     let mut display = IntegerBounds::from_dimensions(size);
     if let Some(window) = document.window {
-        let signed = |v: [u32; 2]| Vec2(v[0] as i32, v[1] as i32);
-        attributes.layer_position = signed(window.origin);
+        attributes.layer_position = Vec2(window.origin[0] as i32, window.origin[1] as i32);
         display = IntegerBounds::from_dimensions(Vec2(window.full[0] as usize, window.full[1] as usize));
     }
     let encoding = Encoding {
