@@ -35,7 +35,7 @@ fn hidden_file(path: &Path) -> std::io::Result<NamedTempFile> {
     builder.tempfile_in(folder(path))
 }
 
-/// Finds out whether [`write`] can succeed, before the work whose result it stores. `inputs` are files that must
+/// Finds out whether [`write()`] can succeed, before the work whose result it stores. `inputs` are files that must
 /// not be overwritten.
 pub fn probe(path: &Path, inputs: &[&Path]) -> Result<()> {
     if path.file_name().is_none() {
