@@ -62,13 +62,13 @@ fn summary(job: &Job, report: &Report, verbose: bool) -> String {
         row("error", format!("{error:.2e} (root mean variance of the samples' mean, before reconstruction)"));
     }
     let dropped = [
-        (report.load.dropped_triangles, "triangles dropped"),
-        (report.load.missing_textures, "textures missing"),
-        (report.dropped_samples, "samples dropped"),
-        (report.missing as u64, "measurements missing"),
+        (report.load.dropped_triangles, "triangles"),
+        (report.load.missing_textures, "textures, missing"),
+        (report.dropped_samples, "samples, not finite"),
+        (report.missing as u64, "measurements, not finite"),
     ];
     for (count, what) in dropped.iter().filter(|d| d.0 > 0) {
-        row(what, count.to_string());
+        row("dropped", format!("{count} {what}"));
     }
     if verbose {
         for (outcome, count) in ShiftOutcome::NAMES.iter().zip(report.statistics.shifts) {
