@@ -115,7 +115,7 @@ def pane():
     picture = quad((-0.7, 0.5, -0.98), (1.4, 0, 0), (0, 1.0, 0), {"kind": "diffuse", "texture": pattern()},
                    uv_range=((0, 0), (1, 1)))
     front = quad((-0.8, 0.05, -0.2), (1.5, 0, 0.3), (0, 1.6, 0), {"kind": "pane"})
-    return {"meshes": room() + [picture, front], "camera": ROOM_CAMERA, "spp": 24576, "max_depth": DEEP}
+    return {"meshes": room() + [picture, front], "camera": ROOM_CAMERA, "spp": 49152, "max_depth": DEEP}
 
 
 def leaf():
