@@ -16,7 +16,7 @@ use gdpt::math::sampler::hash;
 use gdpt::math::warp::square_to_cosine_hemisphere;
 use gdpt::math::{Frame, LANES, Mask, Select, Vec3x, f32x16, lanes, splat};
 use gdpt::scene::{self, Camera, Instance, Material, Mesh, Projection, Scene};
-use glam::{Affine3A, Vec3, Vec3A};
+use glam::{Affine3A, Mat3, Vec3, Vec3A};
 use std::f32::consts::{PI, TAU};
 use std::hint::black_box;
 use std::path::Path;
@@ -116,9 +116,11 @@ fn balls() -> Scene {
     };
     let middle = Vec3::splat(0.5 * (GRID as f32 - 1.0));
     let eye = Vec3::new(low + 0.1, middle.y + 0.7, GRID as f32 - 0.2);
+    let back = (eye - middle).normalize();
+    let right = Vec3::Y.cross(back).normalize();
     let camera = Camera {
         name: String::new(),
-        to_world: Affine3A::look_at_rh(eye, middle, Vec3::Y).inverse(),
+        to_world: Affine3A::from_mat3_translation(Mat3::from_cols(right, back.cross(right), back), eye),
         projection: Projection::Perspective { yfov: 1.1 },
         lens_radius: 0.0,
         focus_distance: 1.0,
