@@ -59,7 +59,7 @@ fn read_reference(name: &str) -> Reference {
     };
     let attributes = image.attributes.other.iter().chain(&layer.attributes.other);
     let max_depth = attributes
-        .filter(|(key, _)| key.eq("maxDepth"))
+        .filter(|(key, _)| **key == *"maxDepth")
         .find_map(
             |(_, value)| if let AttributeValue::I32(depth) = value { Some(*depth as u32) } else { None },
         )

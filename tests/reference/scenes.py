@@ -98,12 +98,12 @@ def textured():
 
 
 def lights():
-    """Point, spot and directional light. The rim of the spot is a hundredth of a degree wide: the falloffs of glTF
+    """Point, spot and directional light. The rim of the spot is 0.033 degrees wide: the falloffs of glTF
     (quadratic in the cosine) and Mitsuba (linear in the angle) differ, a hard rim does not."""
     punctual = [
         {"kind": "point", "position": [-0.5, 1.5, 0.4], "intensity": [0.9, 0.8, 0.6]},
         {"kind": "spot", "position": [0.6, 1.8, 0.8], "target": [-0.3, 0.0, -0.4], "intensity": [3.0, 3.0, 4.0],
-         "inner": np.radians(21.99), "outer": np.radians(22.0)},
+         "inner": np.radians(21.967), "outer": np.radians(22.0)},
         {"kind": "directional", "direction": [-0.35, -0.75, -1.0], "irradiance": [0.5, 0.6, 0.4]},
     ]
     meshes = room(light=False) + [block(*SHORT, GREY), block(*TALL, GREY)]
@@ -115,7 +115,7 @@ def pane():
     picture = quad((-0.7, 0.5, -0.98), (1.4, 0, 0), (0, 1.0, 0), {"kind": "diffuse", "texture": pattern()},
                    uv_range=((0, 0), (1, 1)))
     front = quad((-0.8, 0.05, -0.2), (1.5, 0, 0.3), (0, 1.6, 0), {"kind": "pane"})
-    return {"meshes": room() + [picture, front], "camera": ROOM_CAMERA, "spp": 24576, "max_depth": DEEP}
+    return {"meshes": room() + [picture, front], "camera": ROOM_CAMERA, "spp": 49152, "max_depth": DEEP}
 
 
 def leaf():
