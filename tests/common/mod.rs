@@ -4,7 +4,7 @@ pub mod scenes;
 pub mod shapes;
 pub mod seeds;
 
-use gdpt::accel::{Accel, ObvhsAccel};
+use gdpt::accel::{Accel, EmbreeAccel};
 use gdpt::film::{Film, Half, Plane};
 use gdpt::integrate::{Kind, Settings, Statistics, run};
 use scenes::TestScene;
@@ -12,7 +12,7 @@ use std::sync::atomic::AtomicBool;
 
 /// The backend of the statistical tests.
 pub fn accel(scene: &TestScene) -> impl Accel {
-    ObvhsAccel::new(&scene.scene).expect("test scenes are small")
+    EmbreeAccel::new(&scene.scene, 1, true, None).expect("Embree builds small scenes")
 }
 
 /// The settings a test scene asks for.
