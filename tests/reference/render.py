@@ -17,6 +17,8 @@ from scenes import SCENES, SIZE
 HERE = os.path.dirname(os.path.abspath(__file__))
 # Samples a pixel of one run; the runs are independent and their spread gives the standard error.
 RUN = 512
+# Resolution of the falloff of spot lights.
+SPOT_TEXELS = 1024
 
 
 def bitmap(pixels, raw, nearest):
@@ -72,9 +74,17 @@ def light(spec):
     if spec["kind"] == "directional":
         return {"type": "directional", "direction": spec["direction"],
                 "irradiance": {"type": "rgb", "value": spec["irradiance"]}}
+    # Mitsuba falls off linearly in the angle: its own rim lies outside, and a texture projected by the light, 1 / tan
+    # of the cutoff to the border, carries glTF's falloff.
+    cutoff = spec["outer"] + 0.1
+    side = (np.arange(SPOT_TEXELS) + 0.5) / SPOT_TEXELS * 2 - 1
+    cosine = 1 / np.sqrt(1 + np.tan(cutoff) ** 2 * (side[:, None] ** 2 + side[None, :] ** 2))
+    low, high = np.cos(spec["outer"]), np.cos(spec["inner"])
+    falloff = np.clip((cosine - low) / (high - low), 0, 1) ** 2
     return {"type": "spot", "to_world": mi.ScalarTransform4f().look_at(spec["position"], spec["target"], [0, 1, 0]),
             "intensity": {"type": "rgb", "value": spec["intensity"]},
-            "beam_width": float(np.degrees(spec["inner"])), "cutoff_angle": float(np.degrees(spec["outer"]))}
+            "texture": bitmap(np.repeat(falloff[..., None], 3, -1).astype(np.float32), raw=True, nearest=False),
+            "beam_width": float(np.degrees(cutoff - 1e-3)), "cutoff_angle": float(np.degrees(cutoff))}
 
 
 def directions(u, v):

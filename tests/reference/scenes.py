@@ -98,12 +98,11 @@ def textured():
 
 
 def lights():
-    """Point, spot and directional light. The rim of the spot is 0.033 degrees wide: the falloffs of glTF
-    (quadratic in the cosine) and Mitsuba (linear in the angle) differ, a hard rim does not."""
+    """Point, spot and directional light."""
     punctual = [
         {"kind": "point", "position": [-0.5, 1.5, 0.4], "intensity": [0.9, 0.8, 0.6]},
         {"kind": "spot", "position": [0.6, 1.8, 0.8], "target": [-0.3, 0.0, -0.4], "intensity": [3.0, 3.0, 4.0],
-         "inner": np.radians(21.967), "outer": np.radians(22.0)},
+         "inner": 0.2, "outer": 0.42},
         {"kind": "directional", "direction": [-0.35, -0.75, -1.0], "irradiance": [0.5, 0.6, 0.4]},
     ]
     meshes = room(light=False) + [block(*SHORT, GREY), block(*TALL, GREY)]
