@@ -83,7 +83,12 @@ fn table(name: &str, scene: &Scene, size: (u32, u32), spp: u32) {
     let pt_error = error(&primal, &reference, noise);
     println!("\n{name}, {}x{}, {spp} spp, depth 8, median of {REPEATS}", size.0, size.1);
     println!("  wall seconds: Embree PT {pt:.3}, G-PT {gpt:.3}; obvhs PT {pt_obvhs:.3}, G-PT {gpt_obvhs:.3}");
-    println!("  cost of G-PT over PT {:.2}; Embree over obvhs: PT {:.2}, G-PT {:.2}", gpt / pt, pt_obvhs / pt, gpt_obvhs / gpt);
+    println!(
+        "  cost of G-PT over PT {:.2}; Embree over obvhs: PT {:.2}, G-PT {:.2}",
+        gpt / pt,
+        pt_obvhs / pt,
+        gpt_obvhs / gpt
+    );
     for method in [Method::L2, Method::L1] {
         let solution = reconstruct::solve(&input, method, 0.2);
         let gain = pt_error / error(&solution.image, &reference, noise);
@@ -107,7 +112,8 @@ fn equal_time(c: &mut Criterion) {
         group.sample_size(10);
         for (kind, label) in [(Kind::Path, "PT"), (Kind::GradientPath, "G-PT")] {
             let settings = settings(kind, (128, 128), 4, 0);
-            group.bench_function(format!("{label} embree"), |b| b.iter(|| render(&scene, &embree, &settings)));
+            group
+                .bench_function(format!("{label} embree"), |b| b.iter(|| render(&scene, &embree, &settings)));
             group.bench_function(format!("{label} obvhs"), |b| b.iter(|| render(&scene, &obvhs, &settings)));
         }
         group.finish();

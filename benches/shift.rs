@@ -9,7 +9,11 @@ use std::hint::black_box;
 /// Sixteen surfaces on a wavy plane, `phase` shifts them.
 fn surface(phase: f32) -> Surface {
     let x = lanes(|i| i as f32 * 0.1 + phase);
-    let n = Vec3x::new(lanes(|i| 0.1 * (i as f32 + phase).sin()), lanes(|i| 0.1 * (i as f32).cos()), lanes(|_| 1.0));
+    let n = Vec3x::new(
+        lanes(|i| 0.1 * (i as f32 + phase).sin()),
+        lanes(|i| 0.1 * (i as f32).cos()),
+        lanes(|_| 1.0),
+    );
     let n = n.normalize();
     Surface {
         p: Vec3x::new(x, lanes(|i| i as f32 * 0.05), lanes(|_| phase)),

@@ -8,11 +8,14 @@
 
 pub mod accel;
 pub mod analyze;
+pub mod cli;
 pub mod error;
 pub mod film;
 pub mod integrate;
 pub mod math;
 pub mod path;
 pub mod reconstruct;
+pub mod render;
 pub mod scene;
 pub mod shade;
+pub mod store;

@@ -1,2 +1,6 @@
-//! The command line.
-fn main() {}
+//! The program; see [`gdpt::cli`].
+#![forbid(unsafe_code)]
+
+fn main() -> std::process::ExitCode {
+    gdpt::cli::main()
+}

@@ -222,3 +222,145 @@ fn scene_of(device: &Device, options: SceneOptions, mesh: &Mesh, mask: u32) -> R
 fn in_world(mesh: &Mesh, instance: &Instance) -> Arc<[Vec3A]> {
     mesh.positions.iter().map(|&p| instance.to_world.transform_point3a(p)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::BruteAccel;
+    use crate::math::{Vec3x, lanes};
+    use crate::scene::Material;
+    use glam::{Affine3A, Vec3};
+
+    /// A bumpy sheet of `2 n²` triangles over the unit square, placed by each of `transforms`.
+    fn sheets(n: u32, transforms: &[Affine3A]) -> Scene {
+        let vertex = |i: u32| {
+            let (x, y) = ((i % (n + 1)) as f32 / n as f32, (i / (n + 1)) as f32 / n as f32);
+            Vec3A::new(x, y, 0.1 * (9.0 * x).sin() * (7.0 * y).cos())
+        };
+        let quad = |i: u32| {
+            let a = i / n * (n + 1) + i % n;
+            [[a, a + 1, a + n + 2], [a, a + n + 2, a + n + 1]]
+        };
+        let mesh = Mesh {
+            name: "sheet".into(),
+            positions: (0..(n + 1) * (n + 1)).map(vertex).collect(),
+            triangles: (0..n * n).flat_map(quad).collect(),
+            normals: None,
+            tangents: None,
+            uvs: [None, None],
+            colors: None,
+            material: 0,
+        };
+        let instance = |&to_world: &Affine3A| Instance {
+            mesh: 0,
+            to_world,
+            is_identity: to_world == Affine3A::IDENTITY,
+        };
+        Scene {
+            meshes: vec![mesh],
+            instances: transforms.iter().map(instance).collect(),
+            materials: vec![Material::default()],
+            ..Scene::default()
+        }
+    }
+
+    /// Slanted rays from z = 2 that all meet a sheet over the unit square.
+    fn slanted() -> Rays {
+        let origin =
+            Vec3x::lanes(|i| Vec3::new(i as f32 / 17.0 + 0.031, (i * 7 % 16) as f32 / 17.0 + 0.043, 2.0));
+        Rays::new(origin, Vec3x::splat(Vec3::new(0.01, 0.005, -1.0)))
+    }
+
+    fn intersect(accel: &EmbreeAccel, rays: &Rays) -> Hits {
+        accel.intersect16(rays, Mask::ALL, Visible::All, Coherence::Incoherent)
+    }
+
+    #[test]
+    fn rays_that_are_not_finite_hit_nothing_and_are_counted() {
+        let accel =
+            EmbreeAccel::new(&sheets(4, &[Affine3A::IDENTITY]), 1, false, None).expect("a valid scene");
+        let good = slanted();
+        assert!(intersect(&accel, &good).valid.all());
+        assert_eq!(accel.rejected_rays(), 0);
+        type Spoil = fn(&mut Rays, f32x16);
+        let spoil: [(Spoil, f32); 8] = [
+            (|rays, x| rays.origin.x = x, f32::NAN),
+            (|rays, x| rays.origin.y = x, f32::INFINITY),
+            (|rays, x| rays.origin.z = x, f32::NEG_INFINITY),
+            (|rays, x| rays.direction.x = x, f32::NAN),
+            (|rays, x| rays.direction.y = x, f32::NEG_INFINITY),
+            (|rays, x| rays.direction.z = x, f32::INFINITY),
+            (|rays, x| rays.tnear = x, f32::NAN),
+            (|rays, x| rays.tfar = x, f32::NAN),
+        ];
+        let odd = Mask::from_bits(0xaaaa);
+        for (round, (spoil, value)) in (0u64..).zip(spoil) {
+            let mut bad = good;
+            spoil(&mut bad, splat(value));
+            let rays = Rays {
+                origin: odd.select(bad.origin, good.origin),
+                direction: odd.select(bad.direction, good.direction),
+                tnear: odd.select(bad.tnear, good.tnear),
+                tfar: odd.select(bad.tfar, good.tfar),
+            };
+            assert_eq!(intersect(&accel, &rays).valid.bits(), 0x5555, "round {round}");
+            let occluded = accel.occluded16(&rays, Mask::ALL, Visible::All, Coherence::Coherent);
+            assert_eq!(occluded.bits(), 0x5555, "round {round}");
+            assert_eq!(accel.rejected_rays(), 16 * (round + 1));
+            // In lanes that are not active they are nobody's business.
+            accel.intersect16(&rays, !odd, Visible::All, Coherence::Coherent);
+            assert_eq!(accel.rejected_rays(), 16 * (round + 1));
+        }
+    }
+
+    #[test]
+    fn flattening_transforms_are_hit_like_any_other() {
+        let flat = Affine3A::from_scale(Vec3::new(1.0, 1.0, 0.0));
+        let point = Affine3A::from_scale(Vec3::ZERO);
+        let scene = sheets(5, &[point, flat]);
+        let (accel, brute) = (EmbreeAccel::new(&scene, 1, false, None), BruteAccel::new(&scene));
+        let (accel, brute) = (accel.expect("a valid scene"), brute.expect("a valid scene"));
+        let rays = slanted();
+        let (ours, oracle) = (
+            intersect(&accel, &rays),
+            brute.intersect16(&rays, Mask::ALL, Visible::All, Coherence::Coherent),
+        );
+        assert!(ours.valid.all() && ours.instance == [1; LANES]);
+        assert_eq!(ours.primitive, oracle.primitive);
+        assert!((ours.t - oracle.t).abs().lt(splat(1e-6)).all());
+    }
+
+    #[test]
+    fn thread_count_and_build_leave_no_trace_in_the_hits() {
+        let turned = Affine3A::from_rotation_y(0.2);
+        let scene = sheets(50, &[Affine3A::IDENTITY, turned, Affine3A::from_translation(Vec3::Z)]);
+        let hits = [1, 2, 3].map(|threads| {
+            let accel = EmbreeAccel::new(&scene, threads, false, None).expect("a valid scene");
+            let mut all = Vec::new();
+            for k in 0..200 {
+                let mut rays = slanted();
+                rays.origin.x = rays.origin.x + lanes(|i| ((i * 31 + k * 17) % 101) as f32 * 1e-3);
+                let hits = intersect(&accel, &rays);
+                all.push((hits.t.to_array(), hits.u.to_array(), hits.instance, hits.primitive));
+            }
+            all
+        });
+        assert!(hits[0] == hits[1] && hits[0] == hits[2]);
+    }
+
+    #[test]
+    fn too_little_memory_is_its_own_error() {
+        let scene = sheets(100, &[Affine3A::IDENTITY, Affine3A::from_rotation_x(1.0)]);
+        let error = EmbreeAccel::new(&scene, 2, false, Some(100_000)).expect_err("20,000 triangles");
+        assert!(matches!(error, Error::OutOfMemory(_)), "{error}");
+        assert!(!error.to_string().contains('\n'), "{error}");
+        let accel = EmbreeAccel::new(&scene, 2, false, Some(1 << 30)).expect("1 GiB is enough");
+        assert!(accel.memory_used() > 100_000);
+        assert!(accel.describe().starts_with("Embree 4."), "{}", accel.describe());
+    }
+
+    #[test]
+    fn this_machine_has_what_was_compiled_in() {
+        check_cpu().expect("the tests are built where they run");
+    }
+}

@@ -1,2 +1,3 @@
-//! Measures of error between images.
+//! What images and buffers say about error.
+
 pub mod metrics;

@@ -23,8 +23,8 @@ const BLOCK: usize = 16;
 const ROW_PAIRS: usize = 8;
 
 /// The scalar of a solve: f32 in production, f64 as its oracle.
-pub trait Real: FftNum + Float {}
-impl<T: FftNum + Float> Real for T {}
+pub trait Real: FftNum + Float + From<f32> {}
+impl<T: FftNum + Float + From<f32>> Real for T {}
 
 /// `value` in the precision of the solve.
 pub(crate) fn real<T: Real>(value: f64) -> T {
@@ -128,10 +128,10 @@ impl<T: Real> DctSolver<T> {
         let blocks = self.width.div_ceil(BLOCK);
         let block_len = self.height * BLOCK;
         let mut blocked = vec![T::zero(); 3 * blocks * block_len];
-        blocked
-            .par_chunks_mut(block_len)
-            .enumerate()
-            .for_each_init(|| Work::new(&self.columns, BLOCK / 2), |work, (i, out)| self.column_block(work, field, i, out));
+        blocked.par_chunks_mut(block_len).enumerate().for_each_init(
+            || Work::new(&self.columns, BLOCK / 2),
+            |work, (i, out)| self.column_block(work, field, i, out),
+        );
         field.par_chunks_mut(2 * ROW_PAIRS * self.width).enumerate().for_each_init(
             || Work::new(&self.rows, 1),
             |work, (task, rows)| {
@@ -200,7 +200,10 @@ impl<T: Real> DctSolver<T> {
         let lambda = [self.rows.lambda[kx], self.rows.lambda[(kx + 1).min(self.width - 1)]];
         let apply = |k: usize, x: Complex<T>| {
             let ly = self.columns.lambda[k];
-            Complex::new(x.re * (norm / (p + q * (lambda[0] + ly))), x.im * (norm / (p + q * (lambda[1] + ly))))
+            Complex::new(
+                x.re * (norm / (p + q * (lambda[0] + ly))),
+                x.im * (norm / (p + q * (lambda[1] + ly))),
+            )
         };
         v[0] = if kx == 0 { Complex::new(T::zero(), apply(0, v[0]).im) } else { apply(0, v[0]) };
         for k in 1..=n / 2 {

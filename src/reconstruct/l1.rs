@@ -6,10 +6,10 @@
 //!
 //! The start is the exact L2 image. reg_k is a multiple of the median row residual of that start, which makes the
 //! result independent of the exposure and the schedule independent of the noise. A reweighted system is not solved
-//! to the end: [`STEPS`] steps of conjugate gradients with a multigrid cycle, continued from the iterate before.
+//! to the end: a few steps of conjugate gradients with a multigrid cycle, continued from the iterate before.
 //!
-//! **Stopping rule:** after [`MAX_OUTER`] reweightings, or when the objective fell by less than [`TOLERANCE`]
-//! (relative) in one. Rows without a measurement have the weight zero.
+//! **Stopping rule:** after 8 reweightings, or when the objective fell by less than 5·10⁻⁴ (relative) in one; that
+//! leaves it within about 0.2 % of what 64 reweightings solved to the end reach. Rows without a measurement have the weight zero.
 
 use super::multigrid::{Multigrid, Weights};
 use super::rows::{BAND, NO_DX, NO_DY, NO_PRIMAL, Problem};
@@ -32,7 +32,7 @@ pub(super) struct Schedule {
 }
 
 /// The schedule of [`solve`].
-pub(super) const DEFAULT: Schedule = Schedule { outer: 10, steps: 3, reg: 0.3, decay: 0.5, tolerance: 5e-4 };
+pub(super) const DEFAULT: Schedule = Schedule { outer: 8, steps: 3, reg: 0.1, decay: 0.6, tolerance: 5e-4 };
 
 /// The rows of the problem, α-rows included, seen from the correction y = x − g.
 struct Rows<'a> {
@@ -137,7 +137,13 @@ impl<'a> Rows<'a> {
                     sum += self.row_weights(y, NO_PRIMAL, reg, square, &row.norm[0], &mut w0[part.clone()]);
                     sum += self.row_weights(y, NO_DX, reg, 1.0, &row.norm[1], &mut wx[part.clone()]);
                     sum += self.row_weights(y, NO_DY, reg, 1.0, &row.norm[2], &mut wy[part.clone()]);
-                    normal_residual(row, &v[y * stride..][..stride], [&w0[part.clone()], &wx[part.clone()], &wy[part]], above, r);
+                    normal_residual(
+                        row,
+                        &v[y * stride..][..stride],
+                        [&w0[part.clone()], &wx[part.clone()], &wy[part]],
+                        above,
+                        r,
+                    );
                 }
                 sum
             },
@@ -183,7 +189,13 @@ fn weigh(weight: &[f32], value: &[f32], out: &mut [f32]) {
 }
 
 /// One row of −Kᵀ ω (K v − b); `above` is the weighted vertical residual of the row above, then of this one.
-fn normal_residual(row: &RowResidual, v: &[f32], [w0, wx, wy]: [&[f32]; 3], above: &mut [f32], r: &mut [f32]) {
+fn normal_residual(
+    row: &RowResidual,
+    v: &[f32],
+    [w0, wx, wy]: [&[f32]; 3],
+    above: &mut [f32],
+    r: &mut [f32],
+) {
     let w = w0.len();
     for c in 0..3 {
         let part = c * w..(c + 1) * w;
@@ -200,6 +212,13 @@ fn normal_residual(row: &RowResidual, v: &[f32], [w0, wx, wy]: [&[f32]; 3], abov
     }
 }
 
+/// The objective Σ ‖α (x − g)‖ + ‖Dx x − dx‖ + ‖Dy x − dy‖ of the correction `v`.
+#[cfg(test)]
+pub(super) fn objective(problem: &Problem, alpha: f32, v: &[f32]) -> f64 {
+    let mut weights = Weights::new(problem.width, problem.height);
+    Rows::new(problem, alpha).reweight(v, 1.0, &mut weights, &mut vec![0.0; v.len()])
+}
+
 /// The L1 image.
 pub(super) fn solve(problem: &Problem, alpha: f32) -> Solution {
     solve_with(problem, alpha, DEFAULT)
@@ -208,8 +227,11 @@ pub(super) fn solve(problem: &Problem, alpha: f32) -> Solution {
 /// The L1 image by a schedule of one's own.
 pub(super) fn solve_with(problem: &Problem, alpha: f32, schedule: Schedule) -> Solution {
     let mut v = l2::correction::<f32>(problem, alpha);
-    let done = |v: &[f32], residual, iterations| {
-        Solution { image: problem.image(v), residual, iterations, missing: problem.missing }
+    let done = |v: &[f32], residual, iterations| Solution {
+        image: problem.image(v),
+        residual,
+        iterations,
+        missing: problem.missing,
     };
     if v.is_empty() {
         return done(&v, 0.0, 0);
@@ -219,21 +241,18 @@ pub(super) fn solve_with(problem: &Problem, alpha: f32, schedule: Schedule) -> S
     if scale == 0.0 {
         return done(&v, 0.0, 0);
     }
-    let mut weights = Weights::new(problem.width, problem.height);
+    let mut multigrid = Multigrid::new(problem.width, problem.height);
     let mut r = vec![0.0; v.len()];
     let (mut before, mut change) = (f64::INFINITY, f64::INFINITY);
     for outer in 0..schedule.outer {
         let reg = (scale * schedule.reg * schedule.decay.powi(outer as i32)) as f32;
-        let objective = rows.reweight(&v, reg, &mut weights, &mut r);
-        if std::env::var("L1_TRACE").is_ok() { eprintln!("outer {outer} objective {objective}"); }
+        let objective = multigrid.set_weights(|weights| rows.reweight(&v, reg, weights, &mut r));
         change = (before - objective) / objective;
         if change < schedule.tolerance {
             return done(&v, change, outer);
         }
         before = objective;
-        let mut multigrid = Multigrid::new(weights);
         multigrid.conjugate_gradients(&mut v, &mut r, schedule.steps, 0.0);
-        weights = multigrid.into_weights();
     }
     done(&v, change, schedule.outer)
 }

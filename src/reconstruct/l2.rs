@@ -7,10 +7,10 @@
 //! With missing rows the operator is no longer diagonal. The same problem with the weight zero for those rows is
 //! then solved by conjugate gradients to [`TOLERANCE`], started from the transform.
 
+use super::Solution;
 use super::dct::{DctSolver, Real};
 use super::multigrid::{Multigrid, Weights};
 use super::rows::{BAND, NO_DX, NO_DY, NO_PRIMAL, Problem};
-use super::Solution;
 use rayon::prelude::*;
 
 /// Relative residual at which the solve around missing rows stops.
@@ -36,16 +36,17 @@ pub(super) fn correction<T: Real>(problem: &Problem, alpha: f32) -> Vec<T> {
 pub(super) fn solve(problem: &Problem, alpha: f32) -> Solution {
     let mut y = correction::<f32>(problem, alpha);
     let (primal, gradient) = row_weights(alpha);
-    let mut r = problem.divergence::<f32>(gradient);
-    let scale = norm_square(&r);
     if problem.missing == 0 {
-        let left = uniform_residual(problem, primal as f32, gradient as f32, &y, &r);
-        let residual = if scale > 0.0 { (left / scale).sqrt() } else { 0.0 };
+        let residual = uniform_residual(problem, primal as f32, gradient as f32, &y);
         return Solution { image: problem.image(&y), residual, iterations: 0, missing: 0 };
     }
-    let mut multigrid = Multigrid::new(weights(problem, alpha));
+    let mut r = problem.divergence::<f32>(gradient);
+    let scale = norm_square(&r);
+    let mut multigrid = Multigrid::new(problem.width, problem.height);
+    multigrid.set_weights(|weights| set_weights(problem, alpha, weights));
     multigrid.subtract_product(&y, &mut r);
-    let (iterations, left) = multigrid.conjugate_gradients(&mut y, &mut r, MAX_STEPS, scale * TOLERANCE.powi(2));
+    let (iterations, left) =
+        multigrid.conjugate_gradients(&mut y, &mut r, MAX_STEPS, scale * TOLERANCE.powi(2));
     let residual = if scale > 0.0 { (left / scale).sqrt() } else { 0.0 };
     Solution { image: problem.image(&y), residual, iterations, missing: problem.missing }
 }
@@ -56,45 +57,45 @@ pub(super) fn norm_square(values: &[f32]) -> f64 {
     values.par_chunks(1 << 14).map(sum).collect::<Vec<_>>().iter().sum()
 }
 
-/// Square of the norm of r = b − (primal + gradient L) y.
-fn uniform_residual(problem: &Problem, primal: f32, gradient: f32, y: &[f32], b: &[f32]) -> f64 {
+/// Norm of b − (primal + gradient L) y over that of b, both formed row by row.
+fn uniform_residual(problem: &Problem, primal: f32, gradient: f32, y: &[f32]) -> f64 {
     let (w, h, stride) = (problem.width, problem.height, problem.stride());
     if w == 0 || h == 0 {
         return 0.0;
     }
     let row = |i: usize| &y[i * stride..(i + 1) * stride];
-    let band_sum = |(band, b): (usize, &[f32])| {
-        let mut sum = 0.0;
-        for (i, b) in b.chunks_exact(stride).enumerate() {
-            let i = band * BAND + i;
+    let sums = (0..h.div_ceil(BAND)).into_par_iter().map(|band| {
+        let mut sums = (0.0, 0.0);
+        problem.divergence_band(gradient, band, &mut vec![0.0; stride], |i, b| {
             let (above, here, below) = (row(i.saturating_sub(1)), row(i), row((i + 1).min(h - 1)));
             for c in 0..3 {
-                let value = |x: usize| here[c * w + x];
-                let mut part = 0.0f32;
+                let part = c * w..(c + 1) * w;
+                let [above, here, below, b] = [above, here, below, b].map(|r| &r[part.clone()]);
+                let (mut left, mut all) = (0.0f32, 0.0f32);
                 for x in 0..w {
-                    let at = c * w + x;
-                    let beside = value(x.saturating_sub(1)) + value((x + 1).min(w - 1));
-                    let laplacian = 4.0 * here[at] - (above[at] + below[at] + beside);
-                    part += (b[at] - primal * here[at] - gradient * laplacian).powi(2);
+                    let beside = here[x.saturating_sub(1)] + here[(x + 1).min(w - 1)];
+                    let laplacian = 4.0 * here[x] - (above[x] + below[x] + beside);
+                    left += (b[x] - primal * here[x] - gradient * laplacian).powi(2);
+                    all += b[x] * b[x];
                 }
-                sum += f64::from(part);
+                sums = (sums.0 + f64::from(left), sums.1 + f64::from(all));
             }
-        }
-        sum
-    };
-    b.par_chunks(BAND * stride).enumerate().map(band_sum).collect::<Vec<_>>().iter().sum()
+        });
+        sums
+    });
+    let add = |a: (f64, f64), b: &(f64, f64)| (a.0 + b.0, a.1 + b.1);
+    let (left, all) = sums.collect::<Vec<_>>().iter().fold((0.0, 0.0), add);
+    if all > 0.0 { (left / all).sqrt() } else { 0.0 }
 }
 
-/// The operator with weight zero in missing rows.
-fn weights(problem: &Problem, alpha: f32) -> Weights {
+/// Sets the operator with weight zero in missing rows.
+fn set_weights(problem: &Problem, alpha: f32, weights: &mut Weights) {
     let (w, h) = (problem.width, problem.height);
     let (primal, gradient) = row_weights(alpha);
     let keep = |i: usize, bit: u8, weight: f64| if problem.mask[i] & bit == 0 { weight as f32 } else { 0.0 };
-    let mut weights = Weights::new(w, h);
     for i in 0..w * h {
         weights.w0[i] = keep(i, NO_PRIMAL, primal);
         weights.wx[i] = if i % w + 1 < w { keep(i, NO_DX, gradient) } else { 0.0 };
         weights.wy[i] = if i / w + 1 < h { keep(i, NO_DY, gradient) } else { 0.0 };
     }
-    weights
 }

@@ -67,14 +67,20 @@ pub struct Solution {
 /// Where the planes differ in size or `alpha` is not positive: both are mistakes of the caller.
 pub fn reconstruct(input: &Input, method: Method, alpha: f32) -> Solution {
     let size = |p: &Plane| (p.width, p.height);
-    assert!(size(input.primal) == size(input.dx) && size(input.primal) == size(input.dy), "planes of one size");
+    assert!(
+        size(input.primal) == size(input.dx) && size(input.primal) == size(input.dy),
+        "planes of one size"
+    );
     assert!(alpha > 0.0, "alpha must be positive");
     let problem = rows::Problem::new(input);
     match method {
         Method::L1 => l1::solve(&problem, alpha),
         Method::L2 => l2::solve(&problem, alpha),
-        Method::None => {
-            Solution { image: problem.primal.into_owned(), residual: 0.0, iterations: 0, missing: problem.missing }
-        }
+        Method::None => Solution {
+            image: problem.primal.into_owned(),
+            residual: 0.0,
+            iterations: 0,
+            missing: problem.missing,
+        },
     }
 }

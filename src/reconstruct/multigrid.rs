@@ -34,14 +34,14 @@ impl Weights {
         Self { width, height, w0: plane(), wx: plane(), wy: plane() }
     }
 
-    /// The operator on 2×2 pixels at a time.
-    fn coarser(&self) -> Self {
-        let (w, h) = (self.width.div_ceil(2), self.height.div_ceil(2));
-        let mut coarse = Self::new(w, h);
+    /// Sets `coarse`, of half the size rounded up, to the operator on 2×2 pixels at a time.
+    fn coarsen(&self, coarse: &mut Self) {
+        let w = coarse.width;
         let at = |plane: &[f32], x: usize, y: usize| {
             if x < self.width && y < self.height { plane[y * self.width + x] } else { 0.0 }
         };
-        let rows = coarse.w0.par_chunks_mut(w).zip(coarse.wx.par_chunks_mut(w)).zip(coarse.wy.par_chunks_mut(w));
+        let rows =
+            coarse.w0.par_chunks_mut(w).zip(coarse.wx.par_chunks_mut(w)).zip(coarse.wy.par_chunks_mut(w));
         rows.enumerate().for_each(|(y, ((w0, wx), wy))| {
             for x in 0..w {
                 let (x2, y2) = (2 * x, 2 * y);
@@ -52,13 +52,11 @@ impl Weights {
                 wy[x] = 0.5 * (at(&self.wy, x2, y2 + 1) + at(&self.wy, x2 + 1, y2 + 1));
             }
         });
-        coarse
     }
 
     /// Damping over the diagonal, zero where nothing holds a pixel.
-    fn damped_inverse(&self) -> Vec<f32> {
+    fn damped_inverse(&self, inverse: &mut [f32]) {
         let w = self.width;
-        let mut inverse = vec![0.0; w * self.height];
         inverse.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
             for (x, out) in row.iter_mut().enumerate() {
                 let i = y * w + x;
@@ -68,7 +66,6 @@ impl Weights {
                 *out = if diagonal > f32::MIN_POSITIVE { DAMPING / diagonal } else { 0.0 };
             }
         });
-        inverse
     }
 
     /// Row `y` of A v, from rows y − 1, y and y + 1 of v; at a border pass row y itself for the row outside.
@@ -130,8 +127,9 @@ struct Level {
 
 impl Level {
     fn new(weights: Weights, coarse: bool) -> Self {
-        let n = if coarse { 3 * weights.width * weights.height } else { 0 };
-        Self { inverse: weights.damped_inverse(), weights, rhs: vec![0.0; n], solution: vec![0.0; n] }
+        let pixels = weights.width * weights.height;
+        let n = if coarse { 3 * pixels } else { 0 };
+        Self { inverse: vec![0.0; pixels], weights, rhs: vec![0.0; n], solution: vec![0.0; n] }
     }
 
     /// Row `y` of the first Jacobi step from zero.
@@ -199,7 +197,8 @@ impl Level {
                     let (rhs, inverse) = (&rhs[y * stride..][..stride], &self.inverse[y * w..][..w]);
                     for c in 0..3 {
                         let part = c * w..(c + 1) * w;
-                        let (rhs, product, v) = (&rhs[part.clone()], &product[part.clone()], &three[1][part.clone()]);
+                        let (rhs, product, v) =
+                            (&rhs[part.clone()], &product[part.clone()], &three[1][part.clone()]);
                         let out = &mut out[part];
                         for x in 0..w {
                             out[x] = v[x] + inverse[x] * (rhs[x] - product[x]);
@@ -229,26 +228,46 @@ fn row_dot(a: &[f32], b: &[f32]) -> f64 {
     total
 }
 
+/// Vectors of conjugate gradients, kept from one solve to the next: fresh memory costs more than it seems.
+#[derive(Default)]
+struct Krylov {
+    z: Vec<f32>,
+    p: Vec<f32>,
+    last: Vec<f32>,
+    q: Vec<f32>,
+}
+
 /// The operator and its coarser versions.
 pub(crate) struct Multigrid {
     levels: Vec<Level>,
+    krylov: Krylov,
 }
 
 impl Multigrid {
-    /// Builds all levels down to one pixel.
-    pub fn new(weights: Weights) -> Self {
-        let mut levels = Vec::new();
-        let mut next = Some(weights);
-        while let Some(weights) = next {
-            next = (weights.width * weights.height > 1).then(|| weights.coarser());
-            levels.push(Level::new(weights, !levels.is_empty()));
+    /// All levels down to one pixel, for an operator that is set by [`Self::set_weights`].
+    pub fn new(width: usize, height: usize) -> Self {
+        let (mut w, mut h) = (width, height);
+        let mut levels = vec![Level::new(Weights::new(w, h), false)];
+        while w * h > 1 {
+            (w, h) = (w.div_ceil(2), h.div_ceil(2));
+            levels.push(Level::new(Weights::new(w, h), true));
         }
-        Self { levels }
+        let vector = || vec![0.0; 3 * width * height];
+        Self { levels, krylov: Krylov { z: vector(), p: vector(), last: vector(), q: vector() } }
     }
 
-    /// Gives the weights back, so that their memory can be used again.
-    pub fn into_weights(mut self) -> Weights {
-        std::mem::take(&mut self.levels[0].weights)
+    /// Lets `set` change the weights of the finest level and rebuilds the others; returns what `set` returned.
+    pub fn set_weights<R>(&mut self, set: impl FnOnce(&mut Weights) -> R) -> R {
+        let result = set(&mut self.levels[0].weights);
+        for i in 0..self.levels.len() {
+            let (fine, coarse) = self.levels.split_at_mut(i + 1);
+            let level = &mut fine[i];
+            level.weights.damped_inverse(&mut level.inverse);
+            if let Some(coarse) = coarse.first_mut() {
+                level.weights.coarsen(&mut coarse.weights);
+            }
+        }
+        result
     }
 
     /// `out` = one cycle for `rhs`; returns their dot product.
@@ -302,7 +321,9 @@ impl Multigrid {
             |window, (band, (next, q))| {
                 window.start(band * BAND, &fill);
                 let mut dot = 0.0;
-                for (i, (next, q)) in next.chunks_exact_mut(stride).zip(q.chunks_exact_mut(stride)).enumerate() {
+                for (i, (next, q)) in
+                    next.chunks_exact_mut(stride).zip(q.chunks_exact_mut(stride)).enumerate()
+                {
                     let three = window.advance(band * BAND + i, weights.height, &fill);
                     weights.row_product(band * BAND + i, three, q);
                     next.copy_from_slice(three[1]);
@@ -316,27 +337,32 @@ impl Multigrid {
 
     /// Improves `x` by at most `steps` steps, `r` being its residual on entry and on return. Stops where the square
     /// of the residual's norm is at most `enough`; returns the steps taken and that square.
-    pub fn conjugate_gradients(&mut self, x: &mut [f32], r: &mut [f32], steps: usize, enough: f64) -> (usize, f64) {
+    pub fn conjugate_gradients(
+        &mut self,
+        x: &mut [f32],
+        r: &mut [f32],
+        steps: usize,
+        enough: f64,
+    ) -> (usize, f64) {
         let mut left = super::l2::norm_square(r);
-        let zero = || vec![0.0f32; r.len()];
-        let (mut z, mut p, mut last, mut q) = (zero(), zero(), zero(), zero());
+        let mut krylov = std::mem::take(&mut self.krylov);
+        let Krylov { z, p, last, q } = &mut krylov;
+        p.fill(0.0);
         let mut rho_last = f64::INFINITY;
-        for step in 0..steps {
-            if left <= enough {
-                return (step, left);
-            }
-            let rho = Self::cycle(&mut self.levels, r, &mut z);
-            let beta = (rho / rho_last) as f32;
-            std::mem::swap(&mut p, &mut last);
-            let curvature = self.direction(&z, beta, &last, &mut p, &mut q);
-            let length = rho / curvature;
+        let mut taken = 0;
+        while taken < steps && left > enough {
+            let rho = Self::cycle(&mut self.levels, r, z);
+            std::mem::swap(p, last);
+            let length = rho / self.direction(z, (rho / rho_last) as f32, last, p, q);
             if !(length.is_finite() && length > 0.0) {
-                return (step, left);
+                break;
             }
-            left = advance(length as f32, &p, &q, x, r);
+            left = advance(length as f32, p, q, x, r);
             rho_last = rho;
+            taken += 1;
         }
-        (steps, left)
+        self.krylov = krylov;
+        (taken, left)
     }
 }
 

@@ -70,13 +70,16 @@ impl<'a> Problem<'a> {
         let mut filled = self.primal.as_ref().clone();
         for i in (0..w * h).filter(|&i| self.mask[i] & NO_PRIMAL != 0) {
             let (x, y) = (i % w, i / w);
-            let around = [(x > 0, i.wrapping_sub(1)), (x + 1 < w, i + 1), (y > 0, i.wrapping_sub(w)), (y + 1 < h, i + w)];
-            let mut sum = [0.0; 3];
+            let around = [
+                (x > 0, i.wrapping_sub(1)),
+                (x + 1 < w, i + 1),
+                (y > 0, i.wrapping_sub(w)),
+                (y + 1 < h, i + w),
+            ];
+            let mut sum = [0.0f32; 3];
             let mut count = 0.0;
             for (_, j) in around.into_iter().filter(|&(inside, j)| inside && self.mask[j] & NO_PRIMAL == 0) {
-                for c in 0..3 {
-                    sum[c] += self.primal.data[j][c];
-                }
+                sum.iter_mut().zip(self.primal.data[j]).for_each(|(s, v)| *s += v);
                 count += 1.0;
             }
             filled.data[i] = if count > 0.0 { sum.map(|s| s / count) } else { [0.0; 3] };
@@ -94,7 +97,8 @@ impl<'a> Problem<'a> {
         let w = self.width;
         let here = &self.primal.data[y * w..(y + 1) * w];
         let dx = &self.dx.data[y * w..(y + 1) * w];
-        let difference = |d: f32, a: f32, b: f32| real::<T>(f64::from(d) - (f64::from(b) - f64::from(a)));
+        let t = |v: f32| <T as From<f32>>::from(v);
+        let difference = |d: f32, a: f32, b: f32| t(d) - (t(b) - t(a));
         for c in 0..3 {
             for x in 0..w - 1 {
                 ex[c * w + x] = difference(dx[x][c], here[x][c], here[x + 1][c]);
@@ -126,32 +130,49 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Walks down the pixel rows of band `band`, giving `visit` the number of each and `weight` · Dᵀ e in it; `row` is
+    /// where it is formed.
+    pub fn divergence_band<T: Real>(
+        &self,
+        weight: T,
+        band: usize,
+        row: &mut [T],
+        mut visit: impl FnMut(usize, &[T]),
+    ) {
+        let (w, stride) = (self.width, self.stride());
+        let zero = || vec![T::zero(); stride];
+        let (mut ex, mut ey, mut above) = (zero(), zero(), zero());
+        if band > 0 {
+            self.residuals(band * BAND - 1, &mut ex, &mut above);
+        }
+        for y in band * BAND..((band + 1) * BAND).min(self.height) {
+            self.residuals(y, &mut ex, &mut ey);
+            for c in 0..3 {
+                let part = c * w..(c + 1) * w;
+                let [ex, ey, above] = [&ex, &ey, &above].map(|e| &e[part.clone()]);
+                let out = &mut row[part];
+                out[0] = weight * (above[0] - ey[0] - ex[0]);
+                for x in 1..w {
+                    out[x] = weight * (above[x] - ey[x] + (ex[x - 1] - ex[x]));
+                }
+            }
+            visit(y, row);
+            std::mem::swap(&mut ey, &mut above);
+        }
+    }
+
     /// `weight` · Dᵀ e: the right-hand side of the unweighted problem.
     pub fn divergence<T: Real>(&self, weight: f64) -> Vec<T> {
-        let (w, stride) = (self.width, self.stride());
-        let weight = real::<T>(weight);
+        let stride = self.stride();
         let mut field = vec![T::zero(); stride * self.height];
         if field.is_empty() {
             return field;
         }
         field.par_chunks_mut(BAND * stride).enumerate().for_each(|(band, rows)| {
-            let zero = || vec![T::zero(); stride];
-            let (mut ex, mut ey, mut above) = (zero(), zero(), zero());
-            if band > 0 {
-                self.residuals(band * BAND - 1, &mut ex, &mut above);
-            }
-            for (i, row) in rows.chunks_exact_mut(stride).enumerate() {
-                self.residuals(band * BAND + i, &mut ex, &mut ey);
-                for ((out, ex), (ey, above)) in
-                    row.chunks_exact_mut(w).zip(ex.chunks_exact(w)).zip(ey.chunks_exact(w).zip(above.chunks_exact(w)))
-                {
-                    out[0] = weight * (above[0] - ey[0] - ex[0]);
-                    for x in 1..w {
-                        out[x] = weight * (above[x] - ey[x] + (ex[x - 1] - ex[x]));
-                    }
-                }
-                std::mem::swap(&mut ey, &mut above);
-            }
+            let mut line = vec![T::zero(); stride];
+            self.divergence_band(real(weight), band, &mut line, |y, row| {
+                rows[(y - band * BAND) * stride..][..stride].copy_from_slice(row);
+            });
         });
         field
     }
@@ -159,13 +180,12 @@ impl<'a> Problem<'a> {
     /// The image g + y.
     pub fn image(&self, correction: &[f32]) -> Plane {
         let w = self.width;
-        let mut image = self.primal.as_ref().clone();
+        let mut image = Plane::new(w, self.height);
         if w > 0 {
-            image.data.par_chunks_mut(w).zip(correction.par_chunks(3 * w)).for_each(|(pixels, row)| {
-                for (x, pixel) in pixels.iter_mut().enumerate() {
-                    for c in 0..3 {
-                        pixel[c] += row[c * w + x];
-                    }
+            let rows = image.data.par_chunks_mut(w).zip(self.primal.data.par_chunks(w));
+            rows.zip(correction.par_chunks(3 * w)).for_each(|((pixels, primal), row)| {
+                for (x, (pixel, g)) in pixels.iter_mut().zip(primal).enumerate() {
+                    *pixel = std::array::from_fn(|c| g[c] + row[c * w + x]);
                 }
             });
         }

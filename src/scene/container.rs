@@ -87,17 +87,39 @@ pub(super) fn split(bytes: &[u8]) -> Result<Chunks, Fault> {
     }
 }
 
+/// The JSON as types, and what of it is not typed because it is not honoured.
+#[derive(Debug)]
+pub(super) struct Parsed {
+    pub(super) root: Root,
+    pub(super) is_animated: bool,
+}
+
 /// Reads the JSON. Integers may be written as `1.0`, as JSON allows.
-pub(super) fn parse(json: &[u8]) -> Result<Root, Fault> {
+pub(super) fn parse(json: &[u8]) -> Result<Parsed, Fault> {
     let mut value: Value = match serde_json::from_slice(json) {
         Ok(value) => value,
         Err(e) => return fault("", format!("the JSON is broken: {e}; export the file again")),
     };
     normalise(&mut value);
-    serde_path_to_error::deserialize(value).map_err(|e| {
+    let is_animated = set_motion_aside(&mut value);
+    let root = serde_path_to_error::deserialize(value).map_err(|e| {
         let path = e.path().to_string();
         (if path == "." { String::new() } else { path }, format!("not glTF: {}", e.into_inner()))
-    })
+    })?;
+    Ok(Parsed { root, is_animated })
+}
+
+/// Removes animations and skins, whose types know less than files hold (animation pointers), and gives scenes
+/// without nodes an empty list. Says whether there were animations.
+fn set_motion_aside(value: &mut Value) -> bool {
+    let Value::Object(map) = value else { return false };
+    map.remove("skins");
+    for scene in map.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Value::Object(scene) = scene {
+            scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+        }
+    }
+    map.remove("animations").is_some_and(|animations| animations.as_array().is_some_and(|a| !a.is_empty()))
 }
 
 /// Keys whose integers may pass 32 bits.
@@ -177,12 +199,13 @@ mod tests {
     fn whole_numbers_become_integers_and_wide_indices_are_refused() {
         let good =
             br#"{"asset":{"version":"2.0"},"scene":1e0,"bufferViews":[{"buffer":0.0,"byteLength":10e-1}]}"#;
-        let root = parse(good).expect("integers written as floats are legal");
-        assert_eq!(root.scene.map(|s| s.value()), Some(1));
-        let wide = parse(br#"{"asset":{"version":"2.0"},"scene":4294967296}"#).unwrap_err();
+        let parsed = parse(good).expect("integers written as floats are legal");
+        assert_eq!(parsed.root.scene.map(|s| s.value()), Some(1));
+        let wide =
+            parse(br#"{"asset":{"version":"2.0"},"scene":4294967296}"#).expect_err("no index is that wide");
         assert_eq!(wide.0, "scene");
         let typed = parse(br#"{"asset":{"version":"2.0"},"meshes":[{"primitives":[{"attributes":3}]}]}"#)
-            .unwrap_err();
+            .expect_err("attributes are an object");
         assert_eq!(typed.0, "meshes[0].primitives[0].attributes");
     }
 }

@@ -1,7 +1,7 @@
 //! A glTF file with its buffers in memory, references checked, nothing decoded yet.
 
 use super::budget::Budget;
-use super::container::{self, Fault};
+use super::container::{self, Fault, Parsed};
 use super::uri::{self, Refusal, Target};
 use super::{LoadReport, references};
 use crate::error::{Error, Result};
@@ -55,11 +55,14 @@ impl Document {
         let json = file.get(chunks.json).unwrap_or_default();
         // The tree of JSON values takes several times its text.
         budget.take_array(json.len() as u64, 8, "the scene's JSON")?;
-        let root = container::parse(json).map_err(reject)?;
+        let Parsed { root, is_animated } = container::parse(json).map_err(reject)?;
         check_asset(&root).map_err(reject)?;
         references::check(&root).map_err(reject)?;
         report.generator = one_line(root.asset.generator.as_deref().unwrap_or_default());
         sort_extensions(&root, report);
+        if is_animated {
+            report.warn("animations are not honoured: the scene is shown at rest".into());
+        }
         let mut document = Self { path: path.into(), root, budget, file, buffers: Vec::new() };
         for i in 0..document.root.buffers.len() {
             let buffer = document.load_buffer(i, chunks.binary.clone())?;
@@ -133,10 +136,13 @@ impl Document {
     /// The bytes that a URI names.
     pub(super) fn fetch(&self, uri: &str, kind: &str) -> std::result::Result<Vec<u8>, Fetch> {
         match uri::parse(uri).map_err(Fetch::Forbidden)? {
-            Target::Data(payload) => {
-                self.budget.take(payload.len() as u64 / 4 * 3, kind).map_err(Fetch::Fatal)?;
-                uri::decode_base64(payload)
-                    .ok_or_else(|| Fetch::Corrupt("data: URI with broken base64".into()))
+            Target::Data { payload, is_base64 } => {
+                self.budget.take(payload.len() as u64, kind).map_err(Fetch::Fatal)?;
+                let bytes =
+                    if is_base64 { uri::decode_base64(payload) } else { uri::decode_percent(payload) };
+                bytes.ok_or_else(|| {
+                    Fetch::Corrupt("data: URI that cannot be decoded; export the file again".into())
+                })
             }
             Target::File(relative) => {
                 let parent = self.path.parent().filter(|p| !p.as_os_str().is_empty());

@@ -12,6 +12,8 @@ use gltf::json::validation::Checked;
 const MAX_COORDINATE: f32 = 1e12;
 /// Smallest squared double area, m⁴: below it a normal is not to be had in f32.
 const MIN_AREA_SQUARED: f32 = 1e-37;
+/// Smallest ratio of a triangle's double area to its longest edge squared, squared: corners on one line, in f64.
+const MIN_FLATNESS_SQUARED: f64 = 1e-30;
 
 /// A mesh while it is being put together.
 pub(super) struct Draft {
@@ -267,12 +269,10 @@ impl Draft {
         let positions = &self.positions;
         self.triangles.retain(|triangle| {
             let [a, b, c] = triangle.map(|index| positions[index as usize]);
-            let in_range = |p: Vec3A| p.abs().max_element() <= MAX_COORDINATE && !p.is_nan();
-            let area = (b - a).cross(c - a).length_squared();
-            in_range(a) && in_range(b) && in_range(c) && area > MIN_AREA_SQUARED && area.is_finite()
+            in_range(a) && in_range(b) && in_range(c) && has_area(a, b, c)
         });
         for p in &mut self.positions {
-            if !(p.abs().max_element() <= MAX_COORDINATE) || p.is_nan() {
+            if !in_range(*p) {
                 *p = Vec3A::ZERO;
             }
         }
@@ -338,6 +338,21 @@ impl Draft {
             *uvs = uvs.take().map(|v| pick(&v, order));
         }
     }
+}
+
+/// Whether the renderer can compute with a position.
+fn in_range(p: Vec3A) -> bool {
+    !p.is_nan() && p.abs().max_element() <= MAX_COORDINATE
+}
+
+/// Whether a normal can be computed: in f64 the corners are not on one line, in f32 the cross product is not zero.
+fn has_area(a: Vec3A, b: Vec3A, c: Vec3A) -> bool {
+    let area = (b - a).cross(c - a).length_squared();
+    let [a, b, c] = [a, b, c].map(|p| Vec3::from(p).as_dvec3());
+    let (ab, ac, bc) = (b - a, c - a, c - b);
+    let longest = ab.length_squared().max(ac.length_squared()).max(bc.length_squared());
+    let flatness = ab.cross(ac).length_squared();
+    area > MIN_AREA_SQUARED && area.is_finite() && flatness > MIN_FLATNESS_SQUARED * longest * longest
 }
 
 /// A vector of unit length, in f64 so that no length under- or overflows; `None` for zero or not finite.

@@ -15,7 +15,7 @@ use std::path::Path;
 pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let mut report = LoadReport::default();
     let document = &Document::open(path, options.max_memory, &mut report)?;
-    warn_of_motion(document, &mut report);
+    warn_of_skins(document, &mut report);
 
     // Materials name the textures that have to be decoded.
     let mut reader = MaterialReader { document, textures: TextureTable::default() };
@@ -76,10 +76,7 @@ pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     Ok(scene)
 }
 
-fn warn_of_motion(document: &Document, report: &mut LoadReport) {
-    if !document.root.animations.is_empty() {
-        report.warn("animations are not honoured: the scene is shown at rest".into());
-    }
+fn warn_of_skins(document: &Document, report: &mut LoadReport) {
     if document.root.nodes.iter().any(|n| n.skin.is_some()) {
         report.warn("skins are not honoured: meshes are shown in their bind pose".into());
     }

@@ -64,15 +64,20 @@ fn read_light(
                 return Err(document.reject(f.at("spot"), "is missing; a spot light needs its angles"));
             };
             let value = spot.number("outerConeAngle", FRAC_PI_4)?;
-            let outer = clamped(report, &spot.at("outerConeAngle"), value, 1e-3, FRAC_PI_2);
+            let outer = clamped(report, &spot.at("outerConeAngle"), value, 0.01, FRAC_PI_2);
             let value = spot.number("innerConeAngle", 0.0)?;
-            // Apart by enough for the falloff between the two cosines to be a finite slope.
-            let inner = clamped(report, &spot.at("innerConeAngle"), value, 0.0, outer * 0.999);
-            PunctualKind::Spot { cos_inner: inner.cos(), cos_outer: outer.cos() }
+            let inner = clamped(report, &spot.at("innerConeAngle"), value, 0.0, outer);
+            // A hard edge is common; the falloff divides by the difference of the two cosines.
+            let cos_outer = outer.cos();
+            PunctualKind::Spot { cos_inner: inner.cos().max(cos_outer + 1e-6), cos_outer }
         }
         other => {
             let shown = one_line(other.unwrap_or("nothing"));
-            return Err(document.reject(f.at("type"), format!("{shown} is none of point, spot, directional")));
+            report.warn(format!(
+                "{}: {shown} is none of point, spot, directional; it is left out",
+                f.at("type")
+            ));
+            return Ok(None);
         }
     };
     let intensity = (color * intensity).min(Vec3::splat(MAX_INTENSITY));

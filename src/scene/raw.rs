@@ -31,7 +31,10 @@ impl<'a> Fields<'a> {
     ) -> Result<Option<Self>> {
         match others.and_then(|map| map.get(name)) {
             None => Ok(None),
-            Some(value) => Self::object(document, value, format!("{at}.extensions.{name}")).map(Some),
+            Some(value) => {
+                let dot = if at.is_empty() { "" } else { "." };
+                Self::object(document, value, format!("{at}{dot}extensions.{name}")).map(Some)
+            }
         }
     }
 

@@ -1,6 +1,8 @@
 //! Every index of a glTF file, checked once: an index out of range rejects the file, whoever would use it.
 
 use super::container::Fault;
+use gltf::json::accessor::Accessor;
+use gltf::json::validation::Checked;
 use gltf::json::{Index, Root, texture};
 
 /// Checks one index against the number of things it may name.
@@ -57,10 +59,35 @@ fn buffers(root: &Root) -> Result<(), Fault> {
     let views = root.buffer_views.len();
     for (i, accessor) in root.accessors.iter().enumerate() {
         optional(accessor.buffer_view, views, "bufferView", || format!("accessors[{i}].bufferView"))?;
+        check_stride(root, accessor).map_err(|what| (format!("accessors[{i}]"), what))?;
         if let Some(sparse) = &accessor.sparse {
+            let (replaced, count) = (sparse.count.0, accessor.count.0);
+            if replaced > count {
+                return Err((
+                    format!("accessors[{i}].sparse.count"),
+                    format!("replaces {replaced} of {count} elements"),
+                ));
+            }
             let (indices, values) = (sparse.indices.buffer_view.value(), sparse.values.buffer_view.value());
             index(indices, views, "bufferView", || format!("accessors[{i}].sparse.indices.bufferView"))?;
             index(values, views, "bufferView", || format!("accessors[{i}].sparse.values.bufferView"))?;
+        }
+    }
+    Ok(())
+}
+
+fn check_stride(root: &Root, accessor: &Accessor) -> Result<(), String> {
+    let stride =
+        accessor.buffer_view.and_then(|v| root.buffer_views.get(v.value())).and_then(|v| v.byte_stride);
+    if let (Some(stride), Checked::Valid(component), Checked::Valid(kind)) =
+        (stride, accessor.component_type, accessor.type_)
+    {
+        let size = component.0.size() * kind.multiplicity();
+        if stride.0 < size {
+            return Err(format!(
+                "elements of {size} bytes overlap at a stride of {}; export the file again",
+                stride.0
+            ));
         }
     }
     Ok(())

@@ -17,7 +17,7 @@
 //! times |cosθi|, `pdf` in sr⁻¹, for Diracs the coefficient and the probability. Both sides scatter alike, sides
 //! being those of the shading normal; only a solid dielectric knows its inside.
 
-use super::fresnel::{self, SCHLICK_MEAN, schlick, schlick_weight};
+use super::fresnel::{self, Dielectric, SCHLICK_MEAN, schlick, schlick_weight};
 use super::microfacet::{distribution, sample_visible_normal, smith_g1};
 use crate::math::warp::square_to_cosine_hemisphere;
 use crate::math::{Compare, Frame, Mask, Rgb, Vec3x, f32x16, splat};
@@ -59,7 +59,7 @@ pub struct Bsdf {
     /// Schlick's reflectances of metal and layer together, weights applied.
     f0: Rgb,
     f90: f32x16,
-    /// GGX alpha of the specular lobes; 0 is Dirac.
+    /// GGX alpha of the specular lobes; 0 where they are Diracs or there is none.
     alpha: f32x16,
     /// Weight of the transmissive dielectric.
     clear: f32x16,
@@ -154,19 +154,21 @@ impl Bsdf {
         // Where indices match, no microfacet deflects: the transmission is a Dirac at any roughness.
         let matched = p.solid & p.ior.same(one) & clear.gt(f32x16::ZERO);
         let smooth = alpha.lt(splat(Material::SMOOTH_ALPHA)) | matched;
-        Self {
+        let mut bsdf = Self {
             frame,
             diffuse: p.base * ratio(opaque, one - mean),
             layer: [layer_f0, p.specular],
             f0,
             f90,
-            alpha: smooth.select(f32x16::ZERO, alpha),
+            alpha: f32x16::ZERO,
             clear,
             tint: p.base * clear,
             ior: closed.select(one, p.ior),
             solid: p.solid,
             absorption: p.solid.keep(p.absorption),
-        }
+        };
+        bsdf.alpha = bsdf.has_specular().and_not(smooth).keep(alpha);
+        bsdf
     }
 
     /// A frame that scatters nothing.
@@ -184,7 +186,7 @@ impl Bsdf {
     /// Lanes with a Lambertian or rough lobe.
     #[inline(always)]
     pub fn has_smooth(&self) -> Mask {
-        !self.diffuse.is_zero() | (self.has_specular() & self.alpha.gt(f32x16::ZERO))
+        !self.diffuse.is_zero() | self.alpha.gt(f32x16::ZERO)
     }
 
     /// Lanes with a Dirac lobe.
@@ -196,7 +198,7 @@ impl Bsdf {
     /// Smallest GGX alpha over the smooth lobes: infinite where there is only Lambert, 0 where there is none.
     #[inline(always)]
     pub fn smooth_alpha(&self) -> f32x16 {
-        let rough = self.has_specular() & self.alpha.gt(f32x16::ZERO);
+        let rough = self.alpha.gt(f32x16::ZERO);
         let lambert = (!self.diffuse.is_zero()).keep(splat(f32::INFINITY));
         rough.select(self.alpha, lambert)
     }
@@ -255,22 +257,23 @@ impl Bsdf {
     /// Reflected and transmitted shares at a microfacet seen under the cosine `cos` ≥ 0.
     #[inline(always)]
     fn facet(&self, cos: f32x16, eta: f32x16) -> Facet {
-        let one = splat(1.0);
+        let face = fresnel::dielectric(cos, self.solid.select(eta, self.ior));
+        self.facet_of(cos, face)
+    }
+
+    #[inline(always)]
+    fn facet_of(&self, cos: f32x16, face: Dielectric) -> Facet {
         let opaque = schlick(self.f0, self.f90, schlick_weight(cos));
-        if self.clear.simd_gt(f32x16::ZERO).any() {
-            let solid = fresnel::dielectric(cos, self.solid.select(eta, self.ior));
-            let reflected = self.solid.select(solid.reflectance, fresnel::thin(solid.reflectance));
-            let reflect = opaque + Rgb::all(self.clear * reflected);
-            let transmit = self.tint * (one - reflected);
-            let (r, t) = (reflect.luminance(), transmit.luminance());
-            return Facet { reflect, transmit, p_reflect: ratio(r, r + t), cos_t: solid.cos_t };
-        }
-        Facet { reflect: opaque, transmit: Rgb::ZERO, p_reflect: one, cos_t: f32x16::ZERO }
+        let reflected = self.solid.select(face.reflectance, fresnel::thin(face.reflectance));
+        let reflect = opaque + Rgb::all(self.clear * reflected);
+        let transmit = self.tint * (splat(1.0) - reflected);
+        let (r, t) = (reflect.luminance(), transmit.luminance());
+        Facet { reflect, transmit, p_reflect: ratio(r, r + t), cos_t: face.cos_t }
     }
 
     /// World direction of a local one that was seen from `behind`.
     #[inline(always)]
-    fn to_world(&self, behind: Mask, w: Vec3x) -> Vec3x {
+    fn outward(&self, behind: Mask, w: Vec3x) -> Vec3x {
         self.frame.to_world(Vec3x::new(w.x, w.y, behind.select(-w.z, w.z)))
     }
 
@@ -320,7 +323,9 @@ impl Bsdf {
         let (oh, ih) = (wo.dot(h), mirrored.dot(h));
         let facing = oh.gt(zero) & refracted.select(-ih, ih).gt(zero);
 
-        let facet = self.facet(oh, side.eta);
+        let mut face = fresnel::dielectric(oh, self.solid.select(side.eta, self.ior));
+        face.reflectance = refracted.select(fresnel::crossing(oh, ih.abs(), side.eta), face.reflectance);
+        let facet = self.facet_of(oh, face);
         let (g_o, g_i) = (smith_g1(wo.z, self.alpha), smith_g1(cos_i, self.alpha));
         let visible = distribution(h, self.alpha) * g_o / wo.z;
         let denominator = side.eta.mul_add(ih, oh);
@@ -357,7 +362,7 @@ impl Bsdf {
         let pdf = (one - side.p_diffuse) * p;
         let zero = f32x16::ZERO;
         let valid = self.has_dirac() & wo.z.gt(zero) & pdf.gt(zero) & f.max_component().gt(zero);
-        DiracEval { wi: self.to_world(side.behind, wi), f: valid.keep(f), pdf: valid.keep(pdf), eta, valid }
+        DiracEval { wi: self.outward(side.behind, wi), f: valid.keep(f), pdf: valid.keep(pdf), eta, valid }
     }
 
     /// Samples a direction: `u_lobe` chooses the lobe, (u, v) the direction within it, all in [0, 1).
@@ -368,10 +373,13 @@ impl Bsdf {
         let wo = side.wo;
         let diffuse = u_lobe.lt(side.p_diffuse);
         let dirac = self.has_dirac().and_not(diffuse);
-        let rough = active.and_not(diffuse | dirac);
+        let rough = (active & self.alpha.gt(zero)).and_not(diffuse);
         let rest = (u_lobe - side.p_diffuse) / (one - side.p_diffuse);
 
-        let mut wi = square_to_cosine_hemisphere(u, v);
+        let mut wi = Vec3x::ZERO;
+        if (active & diffuse).any() {
+            wi = diffuse.keep(square_to_cosine_hemisphere(u, v));
+        }
         let mut transmit = Mask::NONE;
         if rough.any() {
             let h = sample_visible_normal(wo, self.alpha, u, v);
@@ -386,7 +394,7 @@ impl Bsdf {
         }
         // A microfacet may send light to the wrong side of the surface; single scattering loses it.
         let kept = transmit.select(wi.z.lt(zero), wi.z.gt(zero));
-        let wi = self.to_world(side.behind, wi);
+        let wi = self.outward(side.behind, wi);
         let (f, pdf) = self.eval_side(&side, wi);
         let valid = active & kept & pdf.gt(zero);
         let mut sample = BsdfSample {

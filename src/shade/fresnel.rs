@@ -19,15 +19,19 @@ pub struct Dielectric {
 pub fn dielectric(cos_i: f32x16, eta: f32x16) -> Dielectric {
     let one = splat(1.0);
     let sin2_t = (one - cos_i * cos_i).fast_max(f32x16::ZERO) / (eta * eta);
-    let total = sin2_t.ge(one);
     let cos_t = (one - sin2_t).fast_max(f32x16::ZERO).sqrt();
+    let cos_t = eta.same(one).select(cos_i, cos_t);
+    Dielectric { reflectance: sin2_t.ge(one).select(one, crossing(cos_i, cos_t, eta)), cos_t }
+}
+
+/// Exact Fresnel reflectance where both cosines of a refracted path are known; near the critical angle one of them
+/// cannot be had from the other without loss.
+#[inline(always)]
+pub fn crossing(cos_i: f32x16, cos_t: f32x16, eta: f32x16) -> f32x16 {
     let s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
     let p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-    let partial = splat(0.5) * (s * s + p * p);
     // Equal indices reflect nothing; at grazing incidence the quotients above would be 0 / 0.
-    let matched = eta.same(one);
-    let reflectance = total.select(one, partial);
-    Dielectric { reflectance: matched.select(f32x16::ZERO, reflectance), cos_t: matched.select(cos_i, cos_t) }
+    eta.same(splat(1.0)).select(f32x16::ZERO, splat(0.5) * (s * s + p * p))
 }
 
 /// Reflectance of a thin slab whose two faces each reflect `face`: all orders of inter-reflection summed,

@@ -16,7 +16,7 @@ pub use env::EnvironmentTable;
 pub use lights::{LightPoint, LightSeen, Lights, solid_angle_pdf};
 pub use surface::{Surface, alpha};
 
-use crate::scene::{Instance, Scene};
+use crate::scene::{Instance, Material, Scene};
 use glam::{Mat3A, Vec3, Vec3A};
 use texture::Decoder;
 
@@ -31,6 +31,8 @@ pub struct ShadeScene<'a> {
     decoder: Decoder,
     /// One for each instance.
     placements: Vec<Placement>,
+    /// Materials that read texture coordinates.
+    textured: Vec<bool>,
 }
 
 /// How directions of an instance reach the world.
@@ -60,8 +62,23 @@ impl<'a> ShadeScene<'a> {
         let placements: Vec<_> = scene.instances.iter().map(Placement::new).collect();
         let signs: Vec<_> = placements.iter().map(|p| p.handedness).collect();
         let lights = Lights::new(scene, &decoder, &signs);
-        Self { scene, lights, decoder, placements }
+        let textured = scene.materials.iter().map(has_texture).collect();
+        Self { scene, lights, decoder, placements, textured }
     }
+}
+
+/// Whether a material reads any texture.
+fn has_texture(m: &Material) -> bool {
+    let textures = [
+        &m.base_color_texture,
+        &m.metallic_roughness_texture,
+        &m.normal_texture,
+        &m.emission_texture,
+        &m.specular_texture,
+        &m.specular_color_texture,
+        &m.transmission_texture,
+    ];
+    textures.iter().any(|t| t.is_some())
 }
 
 /// World-space corners of a triangle.

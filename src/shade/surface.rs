@@ -191,7 +191,7 @@ impl Gathered {
         let material = &scene.scene.materials[mesh.material as usize];
         let (u, v) = (hits.u.as_array()[lane], hits.v.as_array()[lane]);
         let at = MeshPoint::new(mesh, primitive, u, v);
-        let uv = at.uv();
+        let uv = if scene.textured[mesh.material as usize] { at.uv() } else { [Vec2::ZERO; 2] };
 
         let corners = corners(instance, &mesh.positions, at.triangle);
         for (column, corner) in self.p.iter_mut().zip(corners) {

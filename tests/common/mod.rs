@@ -2,7 +2,7 @@
 
 pub mod scenes;
 pub mod shapes;
-pub mod stats;
+pub mod seeds;
 
 use gdpt::accel::{Accel, EmbreeAccel};
 use gdpt::film::{Film, Half, Plane};

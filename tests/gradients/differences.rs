@@ -5,7 +5,7 @@
 //! `GDPT_TEST_SEED` adds to all seeds and `GDPT_TEST_SCALE` multiplies the samples, to tell a bug from a tail.
 
 use super::common::scenes::{self, TestScene};
-use super::common::stats::{Estimate, Runs, slope, z_score};
+use super::common::seeds::{Estimate, Runs, slope, z_score};
 use super::common::{Pair, accel, differences, gradients, pairs, render, settings};
 use gdpt::film::Half;
 use gdpt::integrate::{Kind, ShiftOutcome, Statistics};

@@ -6,7 +6,7 @@
 //! see it.
 
 use super::common::scenes::{self, TestScene};
-use super::common::stats::{Runs, z_score};
+use super::common::seeds::{Runs, z_score};
 use super::common::{accel, differences, gradients, pairs, render, settings};
 use gdpt::accel::{Accel, Coherence, Hits, Rays, Visible};
 use gdpt::film::Half;

@@ -2,7 +2,7 @@
 
 use super::common::scenes::{self, TestScene};
 use super::common::shapes::*;
-use super::common::stats::{Runs, estimate, z_score};
+use super::common::seeds::{Runs, estimate, z_score};
 use super::common::{Pair, accel, differences, gradients, pairs, render, settings};
 use gdpt::film::{Half, Plane};
 use gdpt::integrate::{Kind, Settings};

@@ -1,0 +1,98 @@
+//! `--stats-json`: one object about one render.
+//!
+//! | Field | Meaning |
+//! |---|---|
+//! | `version` | of this format: 1. New fields may come without a new version |
+//! | `gdpt` | version of the program |
+//! | `scene` | what was rendered, `triangles`, `extensions_honoured`, `extensions_ignored` |
+//! | `settings` | what decided the image, as in the EXR's `gdpt/` attributes; `norm`, `alpha`, `threads` |
+//! | `samples` | over all pixels |
+//! | `seconds` | wall time: `load`, `build`, `render`, `reconstruct`, `write` |
+//! | `cpu_seconds` | of the whole process, all threads |
+//! | `rays` | `total`, `intersect_packets`, `occluded_packets`, `active_lanes_mean` (of 16) |
+//! | `shifts` | counts by outcome |
+//! | `dropped` | `triangles`, `textures` (missing), `samples` (not finite), `measurements` (missing in the solve) |
+//! | `peak_memory_bytes` | of the process; null where the system does not say |
+//! | `error_estimate` | root mean variance of the mean primal, W·m⁻²·sr⁻¹; null below two samples |
+//! | `residual` | of the solve, relative; null without one |
+//! | `warnings` | of the loader |
+//! | `outputs` | files written |
+
+use crate::integrate::ShiftOutcome;
+use crate::render::{Job, Report, metadata};
+use serde_json::{Map, Value, json};
+
+/// CPU time of this process, s.
+fn cpu_seconds() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
+/// Most memory this process ever held, bytes.
+fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// The number that was typed, not the nearest f32 written out in f64.
+fn decimal(value: f32) -> Value {
+    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
+}
+
+/// The object, as text.
+pub fn json(job: &Job, report: &Report) -> String {
+    let mut settings: Map<String, Value> =
+        metadata::settings(job).into_iter().map(|(name, value)| (name.to_owned(), value.into())).collect();
+    settings.insert("norm".into(), metadata::method_name(job.method).into());
+    settings.insert("alpha".into(), decimal(job.alpha));
+    settings.insert("threads".into(), json!(report.threads));
+    let shifts: Map<String, Value> = ShiftOutcome::NAMES
+        .into_iter()
+        .zip(report.statistics.shifts)
+        .map(|(outcome, count)| (outcome.to_owned(), count.into()))
+        .collect();
+    let seconds = &report.seconds;
+    let rays = &report.statistics.rays;
+    let outputs: Vec<_> = job.outputs.iter().map(|o| o.path.display().to_string()).collect();
+    let object = json!({
+        "version": 1,
+        "gdpt": env!("CARGO_PKG_VERSION"),
+        "scene": {
+            "name": job.source.name(),
+            "triangles": report.triangles,
+            "extensions_honoured": report.load.extensions_honoured,
+            "extensions_ignored": report.load.extensions_ignored,
+        },
+        "settings": settings,
+        "samples": report.samples,
+        "seconds": {
+            "load": seconds.load,
+            "build": seconds.build,
+            "render": seconds.render,
+            "reconstruct": seconds.reconstruct,
+            "write": seconds.write,
+        },
+        "cpu_seconds": cpu_seconds(),
+        "rays": {
+            "total": rays.total,
+            "intersect_packets": rays.intersect_packets,
+            "occluded_packets": rays.occluded_packets,
+            "active_lanes_mean": rays.active_lanes_mean(),
+        },
+        "shifts": shifts,
+        "dropped": {
+            "triangles": report.load.dropped_triangles,
+            "textures": report.load.missing_textures,
+            "samples": report.dropped_samples,
+            "measurements": report.missing,
+        },
+        "peak_memory_bytes": peak_memory(),
+        "error_estimate": report.error_estimate,
+        "residual": report.residual,
+        "warnings": report.load.warnings,
+        "outputs": outputs,
+    });
+    format!("{object:#}\n")
+}
