@@ -126,7 +126,7 @@ impl Head {
     fn direct_light<A: Accel>(&mut self, tracer: &mut Tracer<'_, A>, walk: &Walk<'_>, depth: u32) {
         let coherence = if depth == 1 { Coherence::Coherent } else { Coherence::Incoherent };
         let light =
-            direct::sample(tracer, &self.surface, &walk.streams, depth, self.active, true, coherence);
+            direct::sample(tracer, &self.surface, &walk.streams, depth, self.active, Mask::ALL, coherence);
         let Some(light) = light else { return };
         self.radiance += light.active.keep(self.beta * light.estimate());
 
@@ -416,7 +416,8 @@ fn offset_light<A: Accel>(
     let shared = offset.recent.and_not(light.base.f.is_zero());
     let mut traced = lit;
     traced.visible = lit.visible.and_not(shared);
-    direct::shadow(tracer, &offset.surface, &mut traced, &light.segment, false, coherence);
+    let base_is_lit = !light.base.contribution(&light.point).is_zero();
+    direct::shadow(tracer, &offset.surface, &mut traced, &light.segment, base_is_lit, coherence);
     let visible = shared.select(lit.visible & light.base.visible, traced.visible);
     lit.visible = visible;
     lit.bsdf_pdf = visible.keep(lit.bsdf_pdf);

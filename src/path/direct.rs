@@ -62,19 +62,19 @@ pub fn look<A: Accel>(tracer: &Tracer<'_, A>, surface: &Surface, point: &LightPo
 }
 
 /// Settles the visibility of `lit` where BSDF and, unless `even_if_dark`, radiance are not zero anyway.
+///
+/// A dark side of a light matters to a pair whose other path sees the bright side: as long as nothing is in between,
+/// the BSDF sampler could have found the point, and both ends must count that technique alike.
 #[inline]
 pub fn shadow<A: Accel>(
     tracer: &mut Tracer<'_, A>,
     surface: &Surface,
     lit: &mut Lit,
     segment: &Segment,
-    even_if_dark: bool,
+    even_if_dark: Mask,
     coherence: Coherence,
 ) {
-    let mut wanted = lit.visible.and_not(lit.f.is_zero());
-    if !even_if_dark {
-        wanted = wanted.and_not(lit.seen.radiance.is_zero());
-    }
+    let wanted = lit.visible.and_not(lit.f.is_zero() | lit.seen.radiance.is_zero().and_not(even_if_dark));
     let infinite = lit.seen.distance.same(splat(f32::INFINITY));
     let origin = surface.spawn(lit.seen.wi);
     let rays = Rays {
@@ -94,7 +94,7 @@ pub fn sample<A: Accel>(
     streams: &Streams,
     depth: u32,
     active: Mask,
-    even_if_dark: bool,
+    even_if_dark: Mask,
     coherence: Coherence,
 ) -> Option<DirectLight> {
     let active = active & surface.bsdf.has_smooth();

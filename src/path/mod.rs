@@ -6,6 +6,8 @@
 pub mod bounce;
 pub mod direct;
 pub mod shift;
+#[cfg(test)]
+mod shift_tests;
 pub mod tail;
 pub mod trace;
 

@@ -214,7 +214,7 @@ fn step<A: Accel>(
 
     let streams = &packet.streams;
     if let Some(light) =
-        direct::sample(tracer, &surface, streams, depth, packet.active, false, Coherence::Incoherent)
+        direct::sample(tracer, &surface, streams, depth, packet.active, Mask::NONE, Coherence::Incoherent)
     {
         packet.gather(slots, light.active, beta, tau, light.estimate());
     }

@@ -9,6 +9,7 @@ use super::common::seeds::{Estimate, Runs, slope, z_score};
 use super::common::{Pair, accel, differences, gradients, pairs, render, settings};
 use gdpt::film::Half;
 use gdpt::integrate::{Kind, ShiftOutcome, Statistics};
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 /// Independent seeds of gradients and of the reference.
@@ -19,14 +20,22 @@ const Z: f64 = 4.0;
 
 /// Sums of entries that are tested as one: 4×4 blocks, rows and columns, each for both axes, and everything, all
 /// channels together.
-fn functionals(width: usize, height: usize) -> Vec<Vec<(usize, f64)>> {
-    let mut sums = std::collections::BTreeMap::<(u8, usize, usize, bool), Vec<(usize, f64)>>::new();
+fn functionals(width: usize, height: usize) -> BTreeMap<(Part, bool), Vec<(usize, f64)>> {
+    let mut sums = BTreeMap::<_, Vec<(usize, f64)>>::new();
     for (i, p) in pairs(width, height).enumerate() {
-        for key in [(0, p.x / 4, p.y / 4, p.horizontal), (1, p.x, 0, p.horizontal), (2, 0, p.y, p.horizontal)] {
-            sums.entry(key).or_default().extend((0..3).map(|c| (3 * i + c, 1.0)));
+        for part in [Part::Block(p.x / 4, p.y / 4), Part::Column(p.x), Part::Row(p.y)] {
+            sums.entry((part, p.horizontal)).or_default().extend((0..3).map(|c| (3 * i + c, 1.0)));
         }
     }
-    sums.into_values().collect()
+    sums
+}
+
+/// What is summed over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Part {
+    Block(usize, usize),
+    Column(usize),
+    Row(usize),
 }
 
 /// What the statistics say of one scene.
@@ -53,7 +62,7 @@ fn judge(scene: &TestScene, tested: &Runs, truth: &Runs) -> Verdict {
         .collect();
     let z_of = |w: &[(usize, f64)]| z_score(tested.functional(w), truth.functional(w), exact);
     let worst_sum = functionals(width, height)
-        .iter()
+        .values()
         .map(|w| z_of(w))
         .fold(0.0_f64, |worst, z| if z.abs() > worst.abs() { z } else { worst });
     Verdict { outside, worst, mean: z_of(&weights), worst_sum, slope: slope(tested, truth) }
@@ -75,7 +84,15 @@ fn outliers(scene: &TestScene, tested: &Runs, truth: &Runs) -> Vec<String> {
             })
         })
     };
-    pairs(width, height).enumerate().flat_map(describe).collect()
+    let sums = functionals(width, height).into_iter().filter_map(|((part, horizontal), weights)| {
+        let (g, r) = (tested.functional(&weights), truth.functional(&weights));
+        let (z, axis) = (z_score(g, r, 0.0), if horizontal { "dx" } else { "dy" });
+        (z.abs() >= Z).then(|| {
+            let [sigma_g, sigma_r] = [g.variance.sqrt(), r.variance.sqrt()];
+            format!("sum of {axis} over {part:?}: {:.6} ± {sigma_g:.6}, expected {:.6} ± {sigma_r:.6}, z {z:.2}", g.mean, r.mean)
+        })
+    });
+    pairs(width, height).enumerate().flat_map(describe).chain(sums).collect()
 }
 
 /// A number from the environment.
@@ -162,6 +179,7 @@ scene_tests!(
     spot_light,
     directional_light,
     walls_from_behind,
+    one_sided_light,
     near_sphere_light,
     constant_environment,
     alpha_mask,

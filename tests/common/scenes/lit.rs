@@ -104,6 +104,16 @@ pub fn walls_from_behind() -> TestScene {
     TestScene::new("walls_from_behind", b.scene, camera(v(0.0, 0.8, 2.0), v(0.0, 0.4, -0.2), 55.0), 4)
 }
 
+/// The floor on both sides of a standing light that shines on one: a point of the light is dark for one end of a
+/// pair and bright for the other, and both must weight it alike.
+pub fn one_sided_light() -> TestScene {
+    let mut b = Builder::default();
+    b.quad(v(-3.0, 0.0, -3.0), v(0.0, 0.0, 6.0), v(6.0, 0.0, 0.0), diffuse(0.8, 0.8, 0.8));
+    b.quad(v(-0.8, 0.15, 0.0), v(1.6, 0.0, 0.1), v(0.0, 0.8, 0.0), emitter(Vec3::splat(3.0)));
+    let below = camera(v(0.05, 0.4, 0.9), v(0.0, 0.0, 0.05), 30.0);
+    TestScene::new("one_sided_light", b.scene, below, 2).samples(128, 128)
+}
+
 /// A tessellated sphere light close to the floor (B9c, B10).
 pub fn near_sphere_light() -> TestScene {
     let mut b = Builder::default();
