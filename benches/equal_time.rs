@@ -6,7 +6,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use gdpt::accel::{Accel, EmbreeAccel, ObvhsAccel};
-use gdpt::analyze::metrics::rel_mse;
+use gdpt::analyze::metrics::compare;
 use gdpt::film::{Film, Half, Plane};
 use gdpt::integrate::{self, Kind, Settings};
 use gdpt::reconstruct::{self, Method};
@@ -42,6 +42,10 @@ fn scenes() -> Vec<(&'static str, Scene, (u32, u32))> {
         Err(error) => println!("skipped: sponza: {error}"),
     }
     scenes
+}
+
+fn rel_mse(image: &Plane, reference: &Plane) -> f64 {
+    compare(image, reference).expect("images of one size").rel_mse
 }
 
 /// relMSE without the reference's own noise, which is that of `reference_noise`.
@@ -90,7 +94,7 @@ fn table(name: &str, scene: &Scene, size: (u32, u32), spp: u32) {
         gpt_obvhs / gpt
     );
     for method in [Method::L2, Method::L1] {
-        let solution = reconstruct::solve(&input, method, 0.2);
+        let solution = reconstruct::reconstruct(&input, method, 0.2);
         let gain = pt_error / error(&solution.image, &reference, noise);
         println!(
             "  relMSE of PT over {method:?}: {gain:.1} at equal spp, {:.1} at equal time (PT {pt_error:.3e})",

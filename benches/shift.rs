@@ -15,13 +15,12 @@ fn surface(phase: f32) -> Surface {
         lanes(|_| 1.0),
     );
     let n = n.normalize();
-    Surface {
-        p: Vec3x::new(x, lanes(|i| i as f32 * 0.05), lanes(|_| phase)),
-        ng: n,
-        wo: Vec3x::new(lanes(|_| 0.3), lanes(|_| phase * 0.1), lanes(|_| 0.9)).normalize(),
-        bsdf: Bsdf { frame: Frame::from_normal(n), ..Bsdf::default() },
-        ..Surface::default()
-    }
+    let mut surface = Surface::default();
+    surface.p = Vec3x::new(x, lanes(|i| i as f32 * 0.05), lanes(|_| phase));
+    surface.ng = n;
+    surface.wo = Vec3x::new(lanes(|_| 0.3), lanes(|_| phase * 0.1), lanes(|_| 0.9)).normalize();
+    surface.bsdf = Bsdf::black(Frame::from_normal(n));
+    surface
 }
 
 fn shift(c: &mut Criterion) {

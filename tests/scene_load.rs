@@ -202,7 +202,8 @@ fn materials_carry_every_extension() {
     assert_eq!((m.metallic, m.roughness, m.ior, m.transmission, m.specular), (0.25, 0.75, 1.33, 0.75, 0.5));
     assert_eq!(m.emission, Vec3::new(20.0, 10.0, 0.0));
     assert_eq!(m.alpha_mode, AlphaMode::Mask(0.25));
-    assert!(m.double_sided && m.is_solid && !m.unlit);
+    assert!(m.is_solid && !m.unlit);
+    assert!(!m.double_sided, "by default light leaves the front alone");
     assert!(m.absorption.abs_diff_eq(Vec3::new(0.0, 0.5f32.ln(), 0.25f32.ln()) / -2.0, 1e-6));
     let normal = m.normal_texture.unwrap();
     assert_eq!(normal.transform.transform_point2(Vec2::ZERO), Vec2::new(0.5, 0.25));

@@ -30,6 +30,8 @@ fn thresholds_are_those_of_the_tables() {
 #[test]
 fn equal_images_pass_and_scores_are_standard() {
     let (a, b) = (noisy(1000, 12, 20.0), noisy(2000, 12, 20.0));
+    // 12288 cells of twelve runs: the mean is known to 1/√147456 = 0.0026.
+    assert!((a.grand_mean() - 20.0).abs() < 4.0 * 0.0026, "{}", a.grand_mean());
     let scores = z_scores(&a, &b);
     let variance = scores.iter().flatten().map(|z| z * z).sum::<f64>() / (3 * scores.len()) as f64;
     // 12288 scores: the standard error of their variance is √(2 / 12288) = 0.0128.

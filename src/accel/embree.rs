@@ -339,7 +339,7 @@ mod tests {
             let mut all = Vec::new();
             for k in 0..200 {
                 let mut rays = slanted();
-                rays.origin.x = rays.origin.x + lanes(|i| ((i * 31 + k * 17) % 101) as f32 * 1e-3);
+                rays.origin.x += lanes(|i| ((i * 31 + k * 17) % 101) as f32 * 1e-3);
                 let hits = intersect(&accel, &rays);
                 all.push((hits.t.to_array(), hits.u.to_array(), hits.instance, hits.primitive));
             }

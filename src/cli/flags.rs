@@ -186,6 +186,9 @@ pub struct RenderFlags {
     /// Unit of the file's point, spot and directional lights
     #[arg(long, value_name = "UNIT", default_value = "auto")]
     light_unit: LightUnitFlag,
+    /// Emissive materials that are doubleSided shine from both sides; else from the front alone
+    #[arg(long)]
+    double_sided_emission: bool,
     #[command(flatten)]
     display: DisplayFlags,
     /// Depth of field: f-number, for a film 24 mm high
@@ -398,6 +401,6 @@ impl RenderFlags {
             LightUnitFlag::Auto => LightUnit::Auto,
         };
         let max_memory = self.max_memory.unwrap_or(LoadOptions::default().max_memory);
-        LoadOptions { light_unit, max_memory }
+        LoadOptions { light_unit, double_sided_emission: self.double_sided_emission, max_memory }
     }
 }

@@ -154,8 +154,8 @@ impl FilmTile {
 }
 
 fn accumulate(plane: &mut Plane, i: usize, sum: [f64; 3]) {
-    for c in 0..3 {
-        plane.data[i][c] += sum[c] as f32;
+    for (value, sum) in plane.data[i].iter_mut().zip(sum) {
+        *value += sum as f32;
     }
 }
 

@@ -136,7 +136,13 @@ impl Block {
     }
 
     /// Primary hits of the ring, `active` lanes.
-    pub fn ring<A: Accel>(&self, view: &View<'_>, tracer: &mut Tracer<'_, A>, index: u32, active: Mask) -> Primary {
+    pub fn ring<A: Accel>(
+        &self,
+        view: &View<'_>,
+        tracer: &mut Tracer<'_, A>,
+        index: u32,
+        active: Mask,
+    ) -> Primary {
         self.trace(view, tracer, index, active, ring_offset)
     }
 
@@ -153,8 +159,7 @@ impl Block {
         let (jitter_x, jitter_y) = (settings.filter.sample(u), settings.filter.sample(v));
         let x = lanes(|i| (i64::from(self.x) + offset(i).0) as f32 + jitter_x);
         let y = lanes(|i| (i64::from(self.y) + offset(i).1) as f32 + jitter_y);
-        let rays =
-            view.camera.rays(x, y, settings.width, settings.height, splat(lens_u), splat(lens_v));
+        let rays = view.camera.rays(x, y, settings.width, settings.height, splat(lens_u), splat(lens_v));
         // The thresholds of partial coverage are shared by block and ring, like the jitter.
         let streams = Streams { seeds: [self.seed; LANES], indices: [index; LANES] };
         let segment = Segment::new(&streams, 0, SegmentKind::Scatter);
@@ -170,8 +175,7 @@ impl Primary {
     pub fn direct<A: Accel>(&self, tracer: &Tracer<'_, A>) -> Rgb {
         let lights = &tracer.scene.lights;
         let visible = tracer.scene.scene.environment.as_ref().is_some_and(|e| e.visible);
-        let behind =
-            if visible { lights.environment(self.direction) } else { Rgb::ZERO };
+        let behind = if visible { lights.environment(self.direction) } else { Rgb::ZERO };
         (self.hits.valid & self.surface.is_emitter).keep(self.surface.emission)
             + (!self.hits.valid).keep(behind)
     }

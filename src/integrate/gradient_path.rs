@@ -52,10 +52,8 @@ fn write_head(
     for i in block.inside.iter() {
         let slot = slots[i] as usize;
         tails[slot].radiance = head.radiance.lane(i).to_array();
-        for d in 0..4 {
-            samples[slot].gradient[d] = head.gradient[d].lane(i).to_array();
-            factors[slot][d] = head.tail_factor[d].lane(i).to_array();
-        }
+        samples[slot].gradient = head.gradient.map(|g| g.lane(i).to_array());
+        factors[slot] = head.tail_factor.map(|f| f.lane(i).to_array());
     }
 }
 

@@ -151,8 +151,7 @@ impl Head {
                 let (seen, pdf_ratio) = offset_light(tracer, offset, &light, evaluated, coherence);
                 radiance = evaluated.select(seen, radiance);
                 // J ℓ_y / ℓ_x is 1: base and offset use the same point. Occlusion zeroes f and b, never ℓ.
-                offset_weight =
-                    evaluated.select(r2 * (splat(1.0) + pdf_ratio * pdf_ratio), offset_weight);
+                offset_weight = evaluated.select(r2 * (splat(1.0) + pdf_ratio * pdf_ratio), offset_weight);
             }
             let weight = walk.weights().weight(base_weight, offset_weight);
             let difference = offset.beta * radiance - base;
@@ -191,8 +190,7 @@ impl Head {
         let is_last = depth + 1 >= limits.max_depth;
         for d in 0..4 {
             let shifted = self.shift(tracer, walk, &step, &next, d, is_last);
-            let base_weight =
-                shifted.without_nee.select(splat(1.0), splat(1.0) + next.light_ratio2);
+            let base_weight = shifted.without_nee.select(splat(1.0), splat(1.0) + next.light_ratio2);
             let weight = walk.weights().weight(base_weight, shifted.weight);
             let difference = shifted.beta * shifted.radiance - base;
             self.gradient[d] += (step.active & self.offsets[d].exists).keep(difference * weight);
@@ -445,12 +443,10 @@ fn arrive<A: Accel>(tracer: &Tracer<'_, A>, walk: &Walk<'_>, step: &Bounce) -> N
     let environment = if_any(sky, || lights.environment(wi));
     let environment_pdf = if_any(sky, || lights.environment_pdf(wi));
     let radiance = sky.select(environment, (step.hits.valid & vertex.is_emitter).keep(vertex.emission));
-    let mut next =
-        Next { vertex, sky, radiance, light_ratio2: f32x16::ZERO, diffuse: Mask::NONE };
+    let mut next = Next { vertex, sky, radiance, light_ratio2: f32x16::ZERO, diffuse: Mask::NONE };
     let pdf = sky.select(environment_pdf, on_surface_pdf(step, &next));
     let ratio = (!step.sample.dirac).keep(pdf / step.sample.pdf);
     next.light_ratio2 = ratio * ratio;
     next.diffuse = sky | next.vertex.is_emitter | walk.is_diffuse(&next.vertex);
     next
 }
-

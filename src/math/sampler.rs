@@ -137,8 +137,7 @@ pub fn sample_4d_wide(stream_seeds: &[u32; LANES], indices: &[u32; LANES], set: 
     let epoch = (index >> 16_u32) * u32x16::splat(0x1_0001) + u32x16::splat(set);
     let seed = hash_wide(u32x16::new(*stream_seeds), epoch);
     let index = index & u32x16::splat(SEQUENCE - 1);
-    let shuffled =
-        owen_scramble_reversed(reverse_bits(index), sobol_hash(seed ^ u32x16::splat(0x79c6_8e4a)));
+    let shuffled = owen_scramble_reversed(reverse_bits(index), sobol_hash(seed ^ u32x16::splat(0x79c6_8e4a)));
 
     // Bit i of the index is bit 31 − i of `shuffled`.
     let top = shuffled & u32x16::splat(0xffff_0000);
@@ -146,7 +145,7 @@ pub fn sample_4d_wide(stream_seeds: &[u32; LANES], indices: &[u32; LANES], set: 
     for bit in 0..16_u32 {
         let chosen = u32x16::splat(0) - ((shuffled >> (31 - bit)) & u32x16::splat(1));
         for (point, directions) in points[1..].iter_mut().zip(&DIRECTIONS) {
-            *point = *point ^ (chosen & u32x16::splat(directions[bit as usize]));
+            *point ^= chosen & u32x16::splat(directions[bit as usize]);
         }
     }
 
@@ -183,7 +182,9 @@ mod tests {
     #[test]
     fn streams_differ() {
         let mut seeds: Vec<u32> = (0..64)
-            .flat_map(|y| (0..64).flat_map(move |x| [Stream::Pixel(x, y).seed(0), Stream::Block(x, y).seed(0)]))
+            .flat_map(|y| {
+                (0..64).flat_map(move |x| [Stream::Pixel(x, y).seed(0), Stream::Block(x, y).seed(0)])
+            })
             .collect();
         let n = seeds.len();
         seeds.sort_unstable();

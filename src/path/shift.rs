@@ -84,11 +84,7 @@ pub fn reconnect(x: &Surface, y: &Surface, z: &Surface) -> Reconnection {
     let seen_from_x = z.ng.dot(to_z_from_x).abs() / (d2_x * d_x);
     let seen_from_y = z.ng.dot(to_z_from_y).abs() / (d2_y * d_y);
     let defined = seen_from_x.gt(f32x16::ZERO) & d2_y.gt(f32x16::ZERO);
-    Reconnection {
-        wi: to_z_from_y / d_y,
-        distance: d_y,
-        jacobian: defined.keep(seen_from_y / seen_from_x),
-    }
+    Reconnection { wi: to_z_from_y / d_y, distance: d_y, jacobian: defined.keep(seen_from_y / seen_from_x) }
 }
 
 /// The direction of an offset path that copies the base's half-vector.
@@ -148,7 +144,8 @@ pub fn half_vector(x: &Surface, wi: Vec3x, y: &Surface, transmit: Mask) -> HalfV
     let no_total_reflection = !bends | sin2_t.lt(one);
     let sides_x = p_x.z * s_x.z;
     let sides_y = p_y.z * s_y.z;
-    let same_kind = (sides_x * sides_y).gt(f32x16::ZERO) & !(straight_x.and_not(straight_y) | straight_y.and_not(straight_x));
+    let same_kind = (sides_x * sides_y).gt(f32x16::ZERO)
+        & !(straight_x.and_not(straight_y) | straight_y.and_not(straight_x));
     let valid = no_total_reflection & same_kind & cos_p.gt(f32x16::ZERO) & jacobian.gt(f32x16::ZERO);
     HalfVector {
         wi: y.bsdf.frame.to_world(s_y),

@@ -69,7 +69,14 @@ impl Queues {
     }
 
     /// Adds the `active` lanes of sixteen paths that arrive at `hits`, vertex `depth`.
-    pub fn push_lanes(&mut self, depth: u32, active: Mask, slots: &[u32; LANES], hits: &Hits, arrival: &Arrival) {
+    pub fn push_lanes(
+        &mut self,
+        depth: u32,
+        active: Mask,
+        slots: &[u32; LANES],
+        hits: &Hits,
+        arrival: &Arrival,
+    ) {
         for i in active.iter() {
             let rgb = |v: &Vec3x| v.lane(i).to_array();
             self.push(

@@ -100,8 +100,7 @@ impl<'a, A: Accel> Tracer<'a, A> {
             return Mask::NONE;
         }
         open & Mask::from_fn(|i| {
-            open.get(i)
-                && alpha.as_array()[i] <= segment.threshold(i, hits.instance[i], hits.primitive[i])
+            open.get(i) && alpha.as_array()[i] <= segment.threshold(i, hits.instance[i], hits.primitive[i])
         })
     }
 

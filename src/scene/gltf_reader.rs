@@ -52,6 +52,9 @@ pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     if scene.meshes.iter().any(|m| m.material == default_material) {
         materials.push(Material { name: "default".into(), ..Material::default() });
     }
+    if !options.double_sided_emission {
+        materials.iter_mut().for_each(|material| material.double_sided = false);
+    }
     scene.materials = materials;
 
     let models = read_lights(document, options.light_unit, &mut report)?;

@@ -31,7 +31,7 @@ impl<'a> MaterialReader<'a> {
     ) -> Result<Material> {
         let at = format!("materials[{i}]");
         let name = entry.name.as_deref().map_or_else(|| format!("material {i}"), one_line);
-        let mut material = Material { name, ..Material::default() };
+        let mut material = Material { name, double_sided: entry.double_sided, ..Material::default() };
         self.core(&mut material, entry, &at, report)?;
         let others = entry.extensions.as_ref().map(|e| &e.others);
         material.unlit = others.is_some_and(|map| map.contains_key("KHR_materials_unlit"));

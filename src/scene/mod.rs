@@ -40,13 +40,16 @@ pub use fit::fitted_camera;
 pub struct LoadOptions {
     /// Unit of the file's punctual lights.
     pub light_unit: LightUnit,
+    /// Emissive materials that are `doubleSided` shine from both sides. By default light leaves the front alone, as
+    /// area lights of other path tracers do: many exporters mark every material.
+    pub double_sided_emission: bool,
     /// Bytes that the file, its decoded images and its geometry may take.
     pub max_memory: u64,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { light_unit: LightUnit::Auto, max_memory: 8 << 30 }
+        Self { light_unit: LightUnit::Auto, double_sided_emission: false, max_memory: 8 << 30 }
     }
 }
 
@@ -169,7 +172,7 @@ pub struct Material {
     pub absorption: Vec3,
     /// How alpha is read.
     pub alpha_mode: AlphaMode,
-    /// Emission leaves both sides; scattering always treats both sides alike.
+    /// Emission leaves both sides (see `LoadOptions`); scattering always treats both sides alike.
     pub double_sided: bool,
     /// KHR_materials_unlit: shows `base_color`, scatters nothing.
     pub unlit: bool,

@@ -333,4 +333,16 @@ impl Surface {
     }
 }
 
-crate::lanewise!(Surface { p, ng, wo, bsdf, emission, emitted, two_sided, is_emitter, light_pdf, albedo, offset });
+crate::lanewise!(Surface {
+    p,
+    ng,
+    wo,
+    bsdf,
+    emission,
+    emitted,
+    two_sided,
+    is_emitter,
+    light_pdf,
+    albedo,
+    offset
+});
