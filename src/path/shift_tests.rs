@@ -112,7 +112,8 @@ fn copy(x: &End, s: DVec3, y: &End, transmit: bool) -> Option<(DVec3, f64)> {
 fn finite_difference(s: DVec3, f: impl Fn(DVec3) -> Option<DVec3>) -> Option<f64> {
     const STEP: f64 = 1e-5;
     let (a, b) = s.any_orthonormal_pair();
-    let along = |t: DVec3| Some((f((s + t * STEP).normalize())? - f((s - t * STEP).normalize())?) / (2.0 * STEP));
+    let along =
+        |t: DVec3| Some((f((s + t * STEP).normalize())? - f((s - t * STEP).normalize())?) / (2.0 * STEP));
     Some(along(a)?.cross(along(b)?).length())
 }
 
@@ -258,7 +259,13 @@ struct Techniques {
 
 /// The weights of the two events drawn at `own`, and of its path in them, by the formulas of the head: squared pdfs
 /// over that of the technique drawn. `jacobian` is that of the shift from `own` to `other`.
-fn weights(pairs: &PairWeights, own: &Techniques, other: &Techniques, jacobian: f64, with_nee: bool) -> [f64; 2] {
+fn weights(
+    pairs: &PairWeights,
+    own: &Techniques,
+    other: &Techniques,
+    jacobian: f64,
+    with_nee: bool,
+) -> [f64; 2] {
     let weight = |base: f64, offset: f64| {
         f64::from(pairs.weight(splat(base as f32), splat(offset as f32)).as_array()[0])
     };
@@ -302,9 +309,8 @@ fn weights_of_all_techniques_sum_to_one() {
     }
     // Mixed classes and dead offsets: base-only weights, whatever the pairs.
     for mis in [true, false] {
-        let alone = |ratio: f32| {
-            PairWeights { mis }.weight(splat(1.0 + ratio * ratio), splat(0.0)).as_array()[0]
-        };
+        let alone =
+            |ratio: f32| PairWeights { mis }.weight(splat(1.0 + ratio * ratio), splat(0.0)).as_array()[0];
         assert!((alone(0.3) + alone(1.0 / 0.3) - 1.0).abs() < 1e-6);
         assert_eq!(alone(0.0), 1.0);
     }

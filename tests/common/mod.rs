@@ -1,8 +1,8 @@
 //! What the statistical tests share: scenes built in code, renders of them, statistics over seeds.
 
 pub mod scenes;
-pub mod shapes;
 pub mod seeds;
+pub mod shapes;
 
 use gdpt::accel::{Accel, EmbreeAccel};
 use gdpt::film::{Film, Half, Plane};
@@ -33,14 +33,19 @@ pub fn render<A: Accel>(scene: &TestScene, accel: &A, settings: &Settings) -> (F
 /// One of the two gradient images as a list: x differences of all pairs, then y differences.
 pub fn gradients(film: &Film) -> Vec<[f32; 3]> {
     let (dx, dy) = (film.dx(Half::Both), film.dy(Half::Both));
-    pairs(film.width, film.height).map(|p| if p.horizontal { dx.at(p.x, p.y) } else { dy.at(p.x, p.y) }).collect()
+    pairs(film.width, film.height)
+        .map(|p| if p.horizontal { dx.at(p.x, p.y) } else { dy.at(p.x, p.y) })
+        .collect()
 }
 
 /// The finite differences of an image in the order of [`gradients`].
 pub fn differences(image: &Plane) -> Vec<[f32; 3]> {
     pairs(image.width, image.height)
         .map(|p| {
-            let (a, b) = (image.at(p.x, p.y), if p.horizontal { image.at(p.x + 1, p.y) } else { image.at(p.x, p.y + 1) });
+            let (a, b) = (
+                image.at(p.x, p.y),
+                if p.horizontal { image.at(p.x + 1, p.y) } else { image.at(p.x, p.y + 1) },
+            );
             std::array::from_fn(|c| b[c] - a[c])
         })
         .collect()

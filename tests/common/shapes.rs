@@ -103,11 +103,8 @@ impl Builder {
         let size = upper - lower;
         let (x, y, z) = (Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z);
         let wall = || diffuse(grey, grey, grey);
-        let (left, right) = if coloured {
-            (diffuse(0.6, 0.1, 0.1), diffuse(0.1, 0.5, 0.15))
-        } else {
-            (wall(), wall())
-        };
+        let (left, right) =
+            if coloured { (diffuse(0.6, 0.1, 0.1), diffuse(0.1, 0.5, 0.15)) } else { (wall(), wall()) };
         self.quad(lower, z, x, wall());
         self.quad(lower + y, x, z, wall());
         self.quad(lower, x, y, wall());

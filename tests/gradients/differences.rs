@@ -89,7 +89,10 @@ fn outliers(scene: &TestScene, tested: &Runs, truth: &Runs) -> Vec<String> {
         let (z, axis) = (z_score(g, r, 0.0), if horizontal { "dx" } else { "dy" });
         (z.abs() >= Z).then(|| {
             let [sigma_g, sigma_r] = [g.variance.sqrt(), r.variance.sqrt()];
-            format!("sum of {axis} over {part:?}: {:.6} ± {sigma_g:.6}, expected {:.6} ± {sigma_r:.6}, z {z:.2}", g.mean, r.mean)
+            format!(
+                "sum of {axis} over {part:?}: {:.6} ± {sigma_g:.6}, expected {:.6} ± {sigma_r:.6}, z {z:.2}",
+                g.mean, r.mean
+            )
         })
     });
     pairs(width, height).enumerate().flat_map(describe).chain(sums).collect()
@@ -114,7 +117,8 @@ fn measure(scene: &TestScene) -> (Runs, Runs, Statistics) {
     let scale = variable("GDPT_TEST_SCALE").unwrap_or(1);
     let first = u64::from(variable("GDPT_TEST_SEED").unwrap_or(0));
     for seed in first..first + SEEDS {
-        let (film, done) = render(scene, &accel, &settings(scene, Kind::GradientPath, seed, scale * scene.spp));
+        let (film, done) =
+            render(scene, &accel, &settings(scene, Kind::GradientPath, seed, scale * scene.spp));
         tested.push(&gradients(&film));
         statistics.add(&done);
         let reference = settings(scene, Kind::Path, seed + 1_000_000, scale * scene.reference_spp);

@@ -29,7 +29,9 @@ struct Saboteur<'a, A: Accel> {
 impl<A: Accel> Saboteur<'_, A> {
     /// Film position of the pinhole camera's ray in direction `d`.
     fn film(&self, d: Vec3) -> [f32; 2] {
-        let Projection::Perspective { yfov } = self.camera.projection else { unreachable!("a perspective camera") };
+        let Projection::Perspective { yfov } = self.camera.projection else {
+            unreachable!("a perspective camera")
+        };
         let local = self.camera.to_world.matrix3.transpose() * d;
         let half_height = 0.5 * self.size[1] as f32;
         let scale = half_height / (0.5 * yfov).tan() / -local.z;
@@ -73,7 +75,8 @@ fn across_blocks(scene: &TestScene) -> Vec<usize> {
 /// The worst z-score over the entries between blocks, and that of the sums over their pairs' rows and columns.
 fn worst(scene: &TestScene, hide: Hide, seeds: u64) -> (f64, usize) {
     let accel = accel(scene);
-    let saboteur = Saboteur { accel: super::common::accel(scene), camera: &scene.camera, size: scene.size, hide };
+    let saboteur =
+        Saboteur { accel: super::common::accel(scene), camera: &scene.camera, size: scene.size, hide };
     let (mut tested, mut truth) = (Runs::default(), Runs::default());
     for seed in 0..seeds {
         let (film, _) = render(scene, &saboteur, &settings(scene, Kind::GradientPath, seed, scene.spp));
@@ -86,7 +89,10 @@ fn worst(scene: &TestScene, hide: Hide, seeds: u64) -> (f64, usize) {
         .flat_map(|&i| (3 * i)..(3 * i + 3))
         .map(|e| z_score(tested.entry(e), truth.entry(e), 0.0).abs())
         .collect();
-    (z.iter().fold(0.0, |a, &b| f64::max(a, b)), z.chunks(3).filter(|rgb| rgb.iter().any(|&z| z > 4.0)).count())
+    (
+        z.iter().fold(0.0, |a, &b| f64::max(a, b)),
+        z.chunks(3).filter(|rgb| rgb.iter().any(|&z| z > 4.0)).count(),
+    )
 }
 
 /// With w = 1 everywhere the two sides add up to the primal of the same samples: NEE, BSDF and tail weights of a

@@ -1,8 +1,8 @@
 //! What must hold of any image: exact zeros, furnaces, symmetry, borders, sampler, roulette, threads.
 
 use super::common::scenes::{self, TestScene};
-use super::common::shapes::*;
 use super::common::seeds::{Runs, estimate, z_score};
+use super::common::shapes::*;
 use super::common::{Pair, accel, differences, gradients, pairs, render, settings};
 use gdpt::film::{Half, Plane};
 use gdpt::integrate::{Kind, Settings};
@@ -68,8 +68,10 @@ fn parallel_view_of_a_plane_under_directional_light_is_constant() {
 /// The inside of an emitting, reflecting sphere: radiance emission / (1 − albedo) everywhere.
 fn furnace(albedo: f32, max_depth: u32) -> TestScene {
     let mut b = Builder::default();
-    let material = Material { emission: Vec3::splat(0.5), double_sided: true, ..diffuse(albedo, albedo, albedo) };
-    b.sphere(Vec3::ZERO, 1.0, 12, false, material);
+    let wall = b.material(Material { emission: Vec3::splat(0.5), ..diffuse(albedo, albedo, albedo) });
+    let mut inside = sphere(Vec3::ZERO, 1.0, 12, false, wall);
+    inside.triangles = inside.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    b.mesh(inside);
     let view = camera(v(0.1, 0.2, 0.3), v(-0.3, 0.0, -1.0), 70.0);
     TestScene { size: [16, 16], ..TestScene::new("furnace", b.scene, view, max_depth) }
 }
@@ -164,7 +166,11 @@ fn lossless_surfaces_under_a_white_environment_are_white() {
         }
         let white = estimate(primal.into_iter());
         let (gradient_mean, z) = zero_mean(&gradient);
-        println!("{name}: {:.5} ± {:.5}, gradients {gradient_mean:.1e} (z {z:.2})", white.mean, white.variance.sqrt());
+        println!(
+            "{name}: {:.5} ± {:.5}, gradients {gradient_mean:.1e} (z {z:.2})",
+            white.mean,
+            white.variance.sqrt()
+        );
         assert!((white.mean - 1.0).abs() < 0.002 + Z * white.variance.sqrt(), "{name}: {}", white.mean);
         assert!(z.abs() < Z || gradient_mean.abs() < 1e-6, "{name}: gradients {gradient_mean:.2e}, z {z:.2}");
     }
@@ -280,7 +286,11 @@ fn roulette_changes_no_expectation() {
         };
         let never = measure(u32::MAX, 0..32);
         for (rr_depth, seeds) in [(1, 100..132), (5, 200..232)] {
-            assert_agree(&format!("{} roulette from {rr_depth}", scene.name), &measure(rr_depth, seeds), &never);
+            assert_agree(
+                &format!("{} roulette from {rr_depth}", scene.name),
+                &measure(rr_depth, seeds),
+                &never,
+            );
         }
     }
 }
@@ -384,7 +394,8 @@ fn threads_change_no_bit() {
         .into_iter()
         .map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
-            let (film, statistics) = pool.install(|| render(&scene, &accel, &gradient_settings(&scene, 3, 11)));
+            let (film, statistics) =
+                pool.install(|| render(&scene, &accel, &gradient_settings(&scene, 3, 11)));
             (film.primal(Half::Both), film.dx(Half::A), film.dy(Half::B), film.variance(), statistics.shifts)
         })
         .collect();

@@ -139,10 +139,8 @@ fn coverage(name: &'static str, mode: AlphaMode) -> TestScene {
     b.quad(v(-0.5, 2.0, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(Vec3::splat(6.0)));
     let mut holes = texture(4, 4, |x, y| [200, 150, 100, if (x + y) % 2 == 0 { 235 } else { 40 }]);
     holes.wrap = [Wrap::Repeat, Wrap::Mirror];
-    let leaf = Material {
-        base_color_texture: b.texture(holes),
-        ..with_alpha(diffuse(0.9, 0.9, 0.9), mode, 0.9)
-    };
+    let leaf =
+        Material { base_color_texture: b.texture(holes), ..with_alpha(diffuse(0.9, 0.9, 0.9), mode, 0.9) };
     b.quad(v(-0.6, 0.9, -0.6), v(1.2, 0.0, 0.1), v(0.0, 0.0, 1.2), leaf.clone());
     b.quad(v(-0.7, 0.0, 0.5), v(0.9, 0.0, 0.1), v(0.0, 0.6, 0.0), leaf);
     TestScene::new(name, b.scene, camera(v(0.1, 0.7, 1.7), v(0.0, 0.2, 0.0), 55.0), 4)
