@@ -167,7 +167,8 @@ pub fn thin_lens() -> TestScene {
 /// A plane with a fine colour texture under an area light, beside an emissive texture.
 pub fn textured_plane() -> TestScene {
     let mut b = Builder::default();
-    let check = |x: u32, y: u32| if (x + y).is_multiple_of(2) { [250, 200, 30, 255] } else { [20, 60, 220, 255] };
+    let check =
+        |x: u32, y: u32| if (x + y).is_multiple_of(2) { [250, 200, 30, 255] } else { [20, 60, 220, 255] };
     let mut image = texture(6, 6, check);
     image.srgb = true;
     image.linear_filter = false;
