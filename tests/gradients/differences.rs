@@ -54,7 +54,7 @@ fn judge(scene: &TestScene, tested: &Runs, truth: &Runs) -> Verdict {
     let exact = 1e-6 * scale;
     let z: Vec<f64> = (0..tested.len()).map(|e| z_score(tested.entry(e), truth.entry(e), exact)).collect();
     let worst = z.iter().fold(0.0_f64, |m, z| m.max(z.abs()));
-    let outside = z.chunks(3).filter(|rgb| rgb.iter().any(|z| !(z.abs() < Z))).count();
+    let outside = z.chunks(3).filter(|rgb| rgb.iter().any(|z| z.is_nan() || z.abs() >= Z)).count();
     let weights: Vec<(usize, f64)> = (0..tested.len())
         .map(|e| (e, tested.entry(e).variance + truth.entry(e).variance))
         .filter(|&(_, variance)| variance > 0.0)

@@ -6,3 +6,4 @@ mod common;
 mod differences;
 mod failed_shifts;
 mod invariants;
+mod reconstruction;

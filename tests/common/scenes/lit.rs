@@ -137,7 +137,7 @@ fn coverage(name: &'static str, mode: AlphaMode) -> TestScene {
     let mut b = Builder::default();
     b.quad(v(-3.0, 0.0, -3.0), v(0.0, 0.0, 6.0), v(6.0, 0.0, 0.0), diffuse(0.8, 0.8, 0.8));
     b.quad(v(-0.5, 2.0, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(Vec3::splat(6.0)));
-    let mut holes = texture(4, 4, |x, y| [200, 150, 100, if (x + y) % 2 == 0 { 235 } else { 40 }]);
+    let mut holes = texture(4, 4, |x, y| [200, 150, 100, if (x + y).is_multiple_of(2) { 235 } else { 40 }]);
     holes.wrap = [Wrap::Repeat, Wrap::Mirror];
     let leaf =
         Material { base_color_texture: b.texture(holes), ..with_alpha(diffuse(0.9, 0.9, 0.9), mode, 0.9) };
@@ -167,7 +167,8 @@ pub fn thin_lens() -> TestScene {
 /// A plane with a fine colour texture under an area light, beside an emissive texture.
 pub fn textured_plane() -> TestScene {
     let mut b = Builder::default();
-    let check = |x: u32, y: u32| if (x + y) % 2 == 0 { [250, 200, 30, 255] } else { [20, 60, 220, 255] };
+    let check =
+        |x: u32, y: u32| if (x + y).is_multiple_of(2) { [250, 200, 30, 255] } else { [20, 60, 220, 255] };
     let mut image = texture(6, 6, check);
     image.srgb = true;
     image.linear_filter = false;
