@@ -261,7 +261,8 @@ fn write(job: &Job, film: &Film, camera: &Camera, solved: &Solved) -> Result<()>
         match output.format {
             Format::Png => png::write(&output.path, &solved.image, job.exposure, job.tone_map)?,
             Format::Exr => {
-                let mut document = layers::document(film, &solved.image, &job.layers, job.buffers);
+                let mut document =
+                    layers::document(film, &solved.image, &job.layers, job.buffers, !job.background);
                 let settings = &job.settings;
                 document.window = settings
                     .crop

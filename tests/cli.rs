@@ -358,6 +358,19 @@ fn reconstruct_from_buffers_is_what_render_solves() {
 }
 
 #[test]
+fn without_background_alpha_is_a_matte() {
+    let folder = folder();
+    let wide = ["--size", "48x16", "-o"];
+    render(folder.path(), &[&wide[..], &["seen.exr"]].concat());
+    render(folder.path(), &[&wide[..], &["matte.exr", "--background", "off"]].concat());
+    let (seen, matte) = (read(folder.path(), "seen.exr"), read(folder.path(), "matte.exr"));
+    assert!(seen.channels["A"].iter().all(|&a| a == 1.0));
+    // Left and right of the box there is nothing; its middle is closed.
+    let row = &matte.channels["A"][8 * 48..9 * 48];
+    assert_eq!((row[0], row[24], row[47]), (0.0, 1.0, 0.0));
+}
+
+#[test]
 fn compare_measures_and_refuses() {
     let folder = folder();
     let path = folder.path();

@@ -350,7 +350,7 @@ impl RenderFlags {
             },
             shift_threshold: self.shift_threshold,
             pair_mis: self.pair_mis == Switch::On,
-            features: layers.iter().any(|l| l.needs_features()),
+            features: layers.iter().any(|l| l.needs_features()) || self.background == Switch::Off,
         };
         let cpus = || std::thread::available_parallelism().map_or(1, |n| n.get());
         Ok(Job {

@@ -37,6 +37,8 @@ pub(crate) struct HalfSums {
 /// Means over the samples of what the camera ray meets first; without weights where it meets nothing.
 #[derive(Clone, Debug, Default)]
 pub struct Features {
+    /// Share of the samples that meet a surface, 0 to 1.
+    pub coverage: Vec<f32>,
     /// Distance along the ray, m; infinite where nothing is met.
     pub depth: Vec<f32>,
     /// Unit shading normal, world space.
@@ -84,6 +86,7 @@ impl Film {
             primal_square: plane(),
             gradient_square: std::array::from_fn(|_| vec![0.0; gradient().data.len()]),
             features: with_features.then(|| Features {
+                coverage: vec![0.0; width * height],
                 depth: vec![0.0; width * height],
                 normal: plane(),
                 position: plane(),

@@ -58,6 +58,7 @@ struct PixelSums {
     direct: [f64; 3],
     primal_square: [f64; 3],
     gradient_square: [f64; 4],
+    samples: f64,
     hits: f64,
     depth: f64,
     normal: [f64; 3],
@@ -106,6 +107,7 @@ impl FilmTile {
         }
         let pixel = &mut self.pixels[y * self.width + x];
         let half = (index & 1) as usize;
+        pixel.samples += 1.0;
         add(&mut pixel.primal[half], s.primal);
         add(&mut pixel.direct, s.direct);
         for d in 0..4 {
@@ -162,6 +164,7 @@ fn accumulate(plane: &mut Plane, i: usize, sum: [f64; 3]) {
 fn write_features(features: &mut Features, i: usize, sums: &PixelSums) {
     let n = 1.0 / sums.hits;
     let mean = |v: [f64; 3]| if sums.hits > 0.0 { v.map(|v| (v * n) as f32) } else { [0.0; 3] };
+    features.coverage[i] = (sums.hits / sums.samples.max(1.0)) as f32;
     features.depth[i] = if sums.hits > 0.0 { (sums.depth * n) as f32 } else { f32::INFINITY };
     let normal = glam::Vec3::from(mean(sums.normal)).normalize_or_zero();
     features.normal.data[i] = normal.to_array();

@@ -58,10 +58,13 @@ impl Layer {
     }
 }
 
-/// A document of the finished `image` and the chosen layers of the film.
-pub fn document(film: &Film, image: &Plane, layers: &[Layer], buffers: bool) -> Document {
+/// A document of the finished `image` and the chosen layers of the film. Alpha is the share of samples that meet a
+/// surface where `matte` is set and the film has features, else 1.
+pub fn document(film: &Film, image: &Plane, layers: &[Layer], buffers: bool, matte: bool) -> Document {
     let mut document = Document::new(film.width, film.height);
     set_image(&mut document, image);
+    let coverage = film.features.as_ref().filter(|_| matte).map(|features| features.coverage.clone());
+    document.channels.insert("A".into(), coverage.unwrap_or_else(|| vec![1.0; image.data.len()]));
     for &layer in layers {
         set_layer(&mut document, film, layer);
     }
@@ -71,10 +74,9 @@ pub fn document(film: &Film, image: &Plane, layers: &[Layer], buffers: bool) -> 
     document
 }
 
-/// Puts the image and an opaque alpha into the root layer.
+/// Puts the image into the root layer; alpha stays as it is.
 pub fn set_image(document: &mut Document, image: &Plane) {
     document.set_plane("", RGB, image);
-    document.channels.insert("A".into(), vec![1.0; image.data.len()]);
 }
 
 fn set_layer(document: &mut Document, film: &Film, layer: Layer) {
@@ -171,7 +173,7 @@ mod tests {
     #[test]
     fn has_every_layer_of_the_contract_and_nothing_that_is_not_finite() {
         let film = small_film();
-        let document = document(&film, &film.primal(Half::Both), &Layer::ALL, true);
+        let document = document(&film, &film.primal(Half::Both), &Layer::ALL, true, false);
         let mut expected = vec!["R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "spp.Y"];
         let colors =
             ["albedo", "emission", "variance", "primal", "primal_a", "primal_b", "dx", "dx_a", "dx_b"];
@@ -194,11 +196,12 @@ mod tests {
     fn buffers_come_back_and_their_absence_is_named() {
         let film = small_film();
         let path = std::path::Path::new("a.exr");
-        let full = document(&film, &film.primal(Half::Both), &[], true);
+        let full = document(&film, &film.primal(Half::Both), &[], true, false);
         let back = buffers(&full, path).expect("they were stored");
         assert_eq!((back.dx, back.dy), (film.dx(Half::Both), film.dy(Half::Both)));
         assert_eq!(back.direct, film.direct());
-        let plain = document(&film, &film.primal(Half::Both), &[], false);
+        let plain = document(&film, &film.primal(Half::Both), &[], false, true);
+        assert_eq!((full.channels["A"][0], plain.channels["A"][0], plain.channels["A"][1]), (1.0, 0.0, 1.0));
         let error = buffers(&plain, path).expect_err("there are none").to_string();
         assert!(
             error.contains("a.exr") && error.contains("primal") && error.contains("--buffers"),
