@@ -66,6 +66,7 @@ pub fn settings(job: &Job) -> Vec<(&'static str, String)> {
         ("rr_depth", s.rr_depth.to_string()),
         ("filter", filter_name(s.filter).to_owned()),
         ("light_unit", format!("{:?}", job.load.light_unit).to_lowercase()),
+        ("double_sided_emission", on_off(job.load.double_sided_emission)),
         ("background", on_off(job.background)),
         ("backend", format!("{:?}", job.backend).to_lowercase()),
         ("robust", on_off(job.robust)),
