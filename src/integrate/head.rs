@@ -43,6 +43,8 @@ struct Next {
     sky: Mask,
     /// Radiance that arrives at x_k from there.
     radiance: Rgb,
+    /// ℓ: solid-angle pdf with which light sampling at x_k finds it.
+    light_pdf: f32x16,
     /// (ℓ / b)²: light sampling against BSDF sampling for that radiance; 0 after a Dirac event.
     light_ratio2: f32x16,
     /// Diffuse for the shift: rough enough, or emitting, or the environment.
@@ -181,10 +183,8 @@ impl Head {
         let next = arrive(tracer, walk, &step);
         let beta = self.beta * step.factor();
         let dirac_pdf = step.sample.dirac.select(f32x16::ZERO, step.sample.pdf);
-        let light_pdf = if_any(next.sky, || tracer.scene.lights.environment_pdf(step.sample.wi));
-        let light_pdf = next.sky.select(light_pdf, on_surface_pdf(&step, &next));
         let seen = (step.active & (next.sky | next.vertex.is_emitter)).keep(next.radiance);
-        self.radiance += beta * (seen * emission_weight(dirac_pdf, light_pdf));
+        self.radiance += beta * (seen * emission_weight(dirac_pdf, next.light_pdf));
 
         let base = beta * seen;
         let is_last = depth + 1 >= limits.max_depth;
@@ -428,12 +428,6 @@ fn if_any<T: Default>(lanes: Mask, f: impl FnOnce() -> T) -> T {
     if lanes.any() { f() } else { T::default() }
 }
 
-/// ℓ for the surface that a bounce arrived at.
-#[inline(always)]
-fn on_surface_pdf(step: &Bounce, next: &Next) -> f32x16 {
-    step.hits.valid.keep(light_pdf(&next.vertex, step.sample.wi, step.hits.t))
-}
-
 /// Evaluates where the base arrives.
 fn arrive<A: Accel>(tracer: &Tracer<'_, A>, walk: &Walk<'_>, step: &Bounce) -> Next {
     let wi: Vec3x = step.sample.wi;
@@ -443,10 +437,9 @@ fn arrive<A: Accel>(tracer: &Tracer<'_, A>, walk: &Walk<'_>, step: &Bounce) -> N
     let environment = if_any(sky, || lights.environment(wi));
     let environment_pdf = if_any(sky, || lights.environment_pdf(wi));
     let radiance = sky.select(environment, (step.hits.valid & vertex.is_emitter).keep(vertex.emission));
-    let mut next = Next { vertex, sky, radiance, light_ratio2: f32x16::ZERO, diffuse: Mask::NONE };
-    let pdf = sky.select(environment_pdf, on_surface_pdf(step, &next));
-    let ratio = (!step.sample.dirac).keep(pdf / step.sample.pdf);
-    next.light_ratio2 = ratio * ratio;
-    next.diffuse = sky | next.vertex.is_emitter | walk.is_diffuse(&next.vertex);
-    next
+    let surface_pdf = step.hits.valid.keep(light_pdf(&vertex, wi, step.hits.t));
+    let light_pdf = sky.select(environment_pdf, surface_pdf);
+    let ratio = (!step.sample.dirac).keep(light_pdf / step.sample.pdf);
+    let diffuse = sky | vertex.is_emitter | walk.is_diffuse(&vertex);
+    Next { vertex, sky, radiance, light_pdf, light_ratio2: ratio * ratio, diffuse }
 }
