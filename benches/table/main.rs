@@ -128,10 +128,11 @@ fn run(arguments: &Arguments) -> io::Result<()> {
         return Ok(());
     }
     let table = markdown(&rows);
-    println!("\n{table}");
     if effort.is_test() {
+        println!("{} rows", rows.len());
         return Ok(());
     }
+    println!("\n{table}");
     let file = scenes::root().join("target/bench.md");
     std::fs::write(&file, table)?;
     println!("also in target/bench.md");

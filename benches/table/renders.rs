@@ -1,9 +1,8 @@
 //! Whole renders of a scene: Embree and obvhs, path tracing and gradient-domain path tracing, one and two threads.
 
 use super::Effort;
-use gdpt::film::Film;
-use gdpt::integrate::{Kind, Settings, Statistics};
-use gdpt_bench::measure::{Cost, Rounds, timed};
+use gdpt::integrate::{Kind, Statistics};
+use gdpt_bench::measure::{Cost, Rounds, median, timed};
 use gdpt_bench::render::{Backend, Bed, cpus, megasamples, pool, render, settings};
 use gdpt_bench::replay::Timed;
 use gdpt_bench::scenes;
@@ -91,29 +90,23 @@ fn lanes(name: &str, label: &str, statistics: &Statistics) -> Row {
     Row::value(name, rays.active_lanes_mean(), "", &detail, Target::AtLeast(12.0))
 }
 
-/// CPU time inside Embree, measured around every call of it, over that of a whole render of one thread.
+/// The share of a render on one thread that passes inside calls of the Embree backend: the packing of packets included,
+/// the rest of the renderer not. Both are wall time of the same run, so that a busy machine stretches both.
 pub fn share_of_embree(name: &'static str, effort: &Effort) -> Vec<Row> {
-    let label = format!("{name}: share of PT's CPU time inside Embree, %");
+    let label = format!("{name}: share of PT's time inside the Embree backend, %");
     let scene = match scenes::open(name) {
         Ok(scene) => scene,
         Err(why) => return vec![Row::skipped(label, &why)],
     };
     let bed = Bed::new(&scene.scene);
     let settings = settings(Kind::Path, effort.size(scene.size), effort.spp(scene.spp), 0);
-    let mut inside = 0.0;
-    let timed_embree = |settings: &Settings| -> (Film, f64) {
-        let embree = Timed::new(bed.embree());
-        let (film, _) = render(&scene.scene, &embree, settings);
-        (film, embree.seconds())
+    let share = |_| {
+        pool(1).install(|| {
+            let embree = Timed::new(bed.embree());
+            let (_, whole) = timed(|| render(&scene.scene, &embree, &settings));
+            100.0 * embree.share(whole.wall)
+        })
     };
-    let one = pool(1);
-    let mut shares = Vec::new();
-    let mut whole = Cost::default();
-    for _ in 0..effort.rounds {
-        inside = one.install(|| timed_embree(&settings)).1;
-        whole = one.install(|| timed(|| bed.render(Backend::Embree, &settings))).1;
-        shares.push(100.0 * inside / whole.cpu);
-    }
-    let detail = format!("last round: {inside:.3} s of {}", seconds(whole));
-    vec![Row::value(label, gdpt_bench::measure::median(shares), "", &detail, Target::AtLeast(70.0))]
+    let share = median((0..effort.rounds).map(share));
+    vec![Row::value(label, share, "", "calls timed one by one", Target::AtLeast(70.0))]
 }

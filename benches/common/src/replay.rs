@@ -83,16 +83,16 @@ impl<'a, A: Accel> Timed<'a, A> {
         Self { inner, nanoseconds: AtomicU64::new(0), calls: AtomicU64::new(0) }
     }
 
-    /// Seconds inside so far, less what reading the clock took.
-    pub fn seconds(&self) -> f64 {
+    /// The share of `wall` seconds, during which it was called, that passed inside; reading the clock left out.
+    pub fn share(&self, wall: f64) -> f64 {
         let readings = 100_000;
         let start = Instant::now();
         (0..readings).for_each(|_| {
             std::hint::black_box(Instant::now());
         });
-        let reading = start.elapsed().as_secs_f64() / f64::from(readings);
-        // Between the two readings of a call lies one reading's time: half of each.
-        self.nanoseconds.load(Relaxed) as f64 * 1e-9 - self.calls.load(Relaxed) as f64 * reading
+        let reading = start.elapsed().as_secs_f64() / f64::from(readings) * self.calls.load(Relaxed) as f64;
+        // A call reads the clock twice; half of each reading falls between the two.
+        (self.nanoseconds.load(Relaxed) as f64 * 1e-9 - reading) / (wall - 2.0 * reading)
     }
 
     fn time<T>(&self, work: impl FnOnce() -> T) -> T {
