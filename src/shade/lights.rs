@@ -6,7 +6,7 @@
 //! density at the receiver, pdf / geometry.
 
 use super::env::EnvironmentTable;
-use super::surface::MeshPoint;
+use super::mesh_point::MeshPoint;
 use super::texture::Decoder;
 use super::{ShadeScene, corners, offset_bound};
 use crate::math::alias::AliasTable;
@@ -88,6 +88,8 @@ pub struct LightSeen {
     /// |cosθ| / d² at an area light, m⁻²; 1 for all others.
     pub geometry: f32x16,
 }
+
+crate::lanewise!(LightSeen { wi, distance, target, radiance, geometry });
 
 /// Solid-angle pdf at the receiver, sr⁻¹, of light sampling for a point of area pdf `light_pdf` on a light, at squared
 /// distance `d2` and under the cosine `cos_light` at the light.
