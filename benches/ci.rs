@@ -133,8 +133,21 @@ fn counts(measured: &mut Measured) -> Result<()> {
     Ok(())
 }
 
+fn number(value: f64) -> String {
+    if value >= 1000.0 { format!("{value:.0}") } else { format!("{value:.3}") }
+}
+
+/// A row that failed, in one line.
+fn failure(verdict: &Verdict) -> String {
+    let measured = verdict.measured.map_or("nothing".into(), number);
+    let stored = verdict.stored.map_or("nothing".into(), |stored| {
+        let [low, high] = stored.range().map(number);
+        format!("{}, band {low} to {high}", number(stored.value))
+    });
+    format!("FAILED: {}: measured {measured}, stored {stored}", verdict.name)
+}
+
 fn print(verdicts: &[Verdict]) {
-    let number = |v: f64| if v >= 1000.0 { format!("{v:.0}") } else { format!("{v:.3}") };
     let cells = |v: &Verdict| {
         let range = v.stored.map(|s| s.range().map(number));
         [
@@ -182,9 +195,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let verdicts = stored.compare(&measured);
     print(&verdicts);
     let failed: Vec<_> = verdicts.iter().filter(|v| v.outcome != Outcome::Within).collect();
-    for verdict in &failed {
-        println!("FAILED: {}: {:?}", verdict.name, verdict.outcome);
-    }
+    failed.iter().for_each(|verdict| println!("{}", failure(verdict)));
     if !failed.is_empty() && stored.rustc != rustc {
         println!(
             "note: counts were stored with {}, this is {rustc}; they depend on the compiler",

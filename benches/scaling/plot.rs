@@ -25,11 +25,19 @@ pub fn write(path: &Path, family: &Family, curves: &[(&Curve, Points)]) -> Resul
     Ok(())
 }
 
-/// The smallest and the largest of positive values, a little apart.
-fn range(values: impl Iterator<Item = f64> + Clone) -> std::ops::Range<f64> {
+/// The powers of ten around positive values: an axis without one of them inside would have no labels.
+fn decades(values: impl Iterator<Item = f64> + Clone) -> std::ops::Range<f64> {
     let low = values.clone().fold(f64::INFINITY, f64::min);
     let high = values.fold(0.0, f64::max);
-    0.8 * low..1.25 * high
+    10f64.powf(low.log10().floor())..10f64.powf((high * 1.01).log10().ceil())
+}
+
+fn tick(value: &f64) -> String {
+    if (1e-3..1e5).contains(value) {
+        format!("{}", (value * 1e4).round() / 1e4)
+    } else {
+        format!("{value:.0e}")
+    }
 }
 
 fn draw<B: DrawingBackend>(
@@ -42,13 +50,16 @@ where
     B::ErrorType: 'static,
 {
     let all = curves.iter().flat_map(|(_, points)| points);
-    let (x, y) = (range(all.clone().map(|p| p.0)), range(all.map(|p| p.1)));
+    let (x, y) = (decades(all.clone().map(|p| p.0)), decades(all.map(|p| p.1)));
     let mut chart = ChartBuilder::on(panel)
         .margin(12)
+        .margin_right(24)
         .x_label_area_size(44)
         .y_label_area_size(64)
         .build_cartesian_2d(x.log_scale(), y.log_scale())?;
-    chart.configure_mesh().x_desc(family.axis).y_desc(unit).light_line_style(WHITE.mix(0.0)).draw()?;
+    let mut mesh = chart.configure_mesh();
+    mesh.x_desc(family.axis).y_desc(unit).x_label_formatter(&tick).y_label_formatter(&tick);
+    mesh.light_line_style(WHITE.mix(0.0)).draw()?;
     for (i, (curve, points)) in curves.iter().enumerate() {
         let colour = Palette99::pick(i);
         let dots = points.iter().map(|&p| Circle::new(p, 4, colour.filled()));

@@ -52,7 +52,13 @@ pub fn film(effort: &Effort) -> Vec<Row> {
     let name = "film of G-PT without feature layers, bytes a pixel";
     let [width, height] = effort.size([2048, 2048]);
     match measured_by_child(&format!("film {width}x{height}")) {
-        Ok(bytes) => vec![Row::value(name, bytes.round(), "", "resident memory of a copy, rounded", Target::AtMost(160.0))],
+        Ok(bytes) => vec![Row::value(
+            name,
+            bytes.round(),
+            "",
+            "resident memory of a copy, rounded",
+            Target::AtMost(160.0),
+        )],
         Err(why) => vec![Row::skipped(name, &why)],
     }
 }

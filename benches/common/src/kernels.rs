@@ -92,17 +92,18 @@ fn tile(kind: Kind, scene: Scene) -> Facts {
     let obvhs = ObvhsAccel::new(&scene).expect("the scene fits");
     let settings = settings(kind, [16, 16], 8, 0);
     let pool = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
-    let (replay, statistics) = pool.expect("this thread is there").install(|| {
-        let recorder = Recorder::new(&obvhs);
+    let recorder = Recorder::new(&obvhs);
+    let (replay, coherent, statistics) = pool.expect("this thread is there").install(|| {
         let (_, statistics) = render(&scene, &recorder, &settings);
-        let replay = recorder.replay();
+        let (coherent, replay) = (recorder.coherent_packets(), recorder.replay());
         counted_region(|| render(&scene, &replay, &settings));
-        (replay, statistics)
+        (replay, coherent, statistics)
     });
     assert!(replay.is_finished(), "a render repeats itself");
     let rays = statistics.rays;
     let packets = rays.intersect_packets + rays.occluded_packets;
-    vec![("rays".into(), rays.total as f64), ("packets".into(), packets as f64)]
+    let facts = [("rays", rays.total), ("packets", packets), ("coherent packets", coherent)];
+    facts.map(|(name, count)| (name.to_owned(), count as f64)).into()
 }
 
 /// Directions at a surface.

@@ -11,12 +11,22 @@ pub struct Recorder<'a, A> {
     inner: &'a A,
     hits: Mutex<Vec<Hits>>,
     occluded: Mutex<Vec<Mask>>,
+    coherent: AtomicU64,
 }
 
 impl<'a, A: Accel> Recorder<'a, A> {
     /// Records what `inner` answers.
     pub fn new(inner: &'a A) -> Self {
-        Self { inner, hits: Mutex::default(), occluded: Mutex::default() }
+        Self { inner, hits: Mutex::default(), occluded: Mutex::default(), coherent: AtomicU64::new(0) }
+    }
+
+    /// Packets so far whose rays were said to run alike.
+    pub fn coherent_packets(&self) -> u64 {
+        self.coherent.load(Relaxed)
+    }
+
+    fn note(&self, coherence: Coherence) {
+        self.coherent.fetch_add(u64::from(coherence == Coherence::Coherent), Relaxed);
     }
 
     /// The answers, in order.
@@ -32,12 +42,14 @@ impl<'a, A: Accel> Recorder<'a, A> {
 
 impl<A: Accel> Accel for Recorder<'_, A> {
     fn intersect16(&self, rays: &Rays, active: Mask, visible: Visible, coherence: Coherence) -> Hits {
+        self.note(coherence);
         let hits = self.inner.intersect16(rays, active, visible, coherence);
         self.hits.lock().expect("no thread died while it recorded").push(hits);
         hits
     }
 
     fn occluded16(&self, rays: &Rays, active: Mask, visible: Visible, coherence: Coherence) -> Mask {
+        self.note(coherence);
         let occluded = self.inner.occluded16(rays, active, visible, coherence);
         self.occluded.lock().expect("no thread died while it recorded").push(occluded);
         occluded
