@@ -455,8 +455,7 @@ fn arrive<A: Accel>(tracer: &Tracer<'_, A>, walk: &Walk<'_>, step: &Bounce) -> N
     let lights = &tracer.scene.lights;
     let vertex = Surface::new(tracer.scene, &step.hits, step.active & step.hits.valid, -wi);
     let sky = if lights.has_environment() { step.escaped() } else { Mask::NONE };
-    let environment = if_any(sky, || lights.environment(wi));
-    let environment_pdf = if_any(sky, || lights.environment_pdf(wi));
+    let (environment, environment_pdf) = if_any(sky, || lights.environment_with_pdf(wi));
     let radiance = sky.select(environment, (step.hits.valid & vertex.is_emitter).keep(vertex.emission));
     let surface_pdf = step.hits.valid.keep(light_pdf(&vertex, wi, step.hits.t));
     let light_pdf = sky.select(environment_pdf, surface_pdf);

@@ -75,8 +75,8 @@ fn step<A: Accel>(
     let escaped = next.escaped();
     let lights = &tracer.scene.lights;
     if escaped.any() && lights.has_environment() {
-        let weight = emission_weight(path.bsdf_pdf, lights.environment_pdf(next.sample.wi));
-        path.gather(escaped.keep(lights.environment(next.sample.wi) * weight));
+        let (radiance, pdf) = lights.environment_with_pdf(next.sample.wi);
+        path.gather(escaped.keep(radiance * emission_weight(path.bsdf_pdf, pdf)));
     }
     let goes_on = next.active & next.hits.valid;
     path.finish(active.and_not(goes_on), slots);

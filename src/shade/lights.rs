@@ -222,10 +222,10 @@ impl Lights {
         }
         gather.finish(&mut point);
         if let Some(environment) = self.environment.as_ref().filter(|_| point.is_env.any()) {
-            let (direction, pdf) = environment.sample(u, v);
+            let (direction, pdf, radiance) = environment.sample(u, v);
             point.p = point.is_env.select(direction, point.p);
             point.pdf = point.is_env.select(point.pdf * pdf, point.pdf);
-            point.emission = point.is_env.select(environment.radiance(direction), point.emission);
+            point.emission = point.is_env.select(radiance, point.emission);
         }
         point.valid = point.pdf.gt(f32x16::ZERO);
         point
@@ -262,10 +262,12 @@ impl Lights {
         self.environment.as_ref().map_or(Rgb::ZERO, |e| e.radiance(dir))
     }
 
-    /// pdf in solid angle with which [`Lights::sample`] finds `dir`, selection included, sr⁻¹.
-    pub fn environment_pdf(&self, dir: Vec3x) -> f32x16 {
-        let selection = splat(self.environment_selection());
-        self.environment.as_ref().map_or(f32x16::ZERO, |e| e.pdf(dir) * selection)
+    /// Radiance of the environment from `dir`, and the pdf in solid angle with which [`Lights::sample`] finds it,
+    /// selection included, sr⁻¹.
+    pub fn environment_with_pdf(&self, dir: Vec3x) -> (Rgb, f32x16) {
+        let Some(environment) = &self.environment else { return (Rgb::ZERO, f32x16::ZERO) };
+        let (radiance, pdf) = environment.radiance_and_pdf(dir);
+        (radiance, pdf * splat(self.environment_selection()))
     }
 
     /// Whether there is an environment that is not black.

@@ -30,12 +30,14 @@ pub(super) mod flag {
     pub const SMOOTH: u32 = 1 << 4;
     /// A normal map with its tangents.
     pub const MAPPED: u32 = 1 << 5;
-    /// Textures or vertex colours that change the material's parameters.
+    /// Other textures, or vertex colours, that change the material's parameters.
     pub const TEXTURED: u32 = 1 << 6;
     /// Geometry in object space.
     pub const MOVED: u32 = 1 << 7;
     /// Has a line of attributes.
     pub const ATTRIBUTES: u32 = 1 << 8;
+    /// A base colour texture.
+    pub const BASE_TEXTURED: u32 = 1 << 9;
 }
 
 /// Where an instance's records are.
@@ -121,9 +123,15 @@ fn material(m: &Material) -> Line {
     ])
 }
 
-/// Whether hits need the mesh itself, because something changes the parameters of the material's line.
+/// Whether something beside a base colour texture changes the parameters of the material's line.
 fn is_textured(material: &Material, mesh: &Mesh) -> bool {
-    mesh.colors.is_some() || material.texture_refs().next().is_some()
+    let textures = [
+        &material.metallic_roughness_texture,
+        &material.specular_texture,
+        &material.specular_color_texture,
+        &material.transmission_texture,
+    ];
+    mesh.colors.is_some() || textures.iter().any(|t| t.is_some())
 }
 
 fn flags(instance: &Instance, mesh: &Mesh, m: &Material) -> u32 {
@@ -136,6 +144,7 @@ fn flags(instance: &Instance, mesh: &Mesh, m: &Material) -> u32 {
         (mesh.normals.is_some(), flag::SMOOTH),
         (m.normal_texture.is_some() && mesh.tangents.is_some(), flag::MAPPED),
         (is_textured(m, mesh), flag::TEXTURED),
+        (m.base_color_texture.is_some(), flag::BASE_TEXTURED),
         (!instance.is_identity, flag::MOVED),
         (attributes, flag::ATTRIBUTES),
     ]

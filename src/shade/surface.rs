@@ -6,6 +6,7 @@
 
 use super::mesh_point::MeshPoint;
 use super::records::{self, HANDEDNESS, NO_TRIANGLE, OFFSET, UV, flag};
+use super::texture::Footprint;
 use super::{Bsdf, Parameters, ShadeScene};
 use crate::accel::Hits;
 use crate::math::transpose::{Line, columns};
@@ -166,7 +167,33 @@ impl Gathered {
     }
 }
 
-/// Multiplies what textures and vertex colours say into the columns of the material.
+/// Multiplies base colour textures into the columns of the material.
+fn apply_base_textures(
+    scene: &ShadeScene,
+    hits: &Hits,
+    lanes: Mask,
+    uv: [f32x16; 2],
+    material: &mut [f32x16; LANES],
+) {
+    let [u, v] = uv.map(f32x16::to_array);
+    // First all reads, none of which waits for another: the texels are rarely in the nearest cache.
+    let mut footprints = [Footprint::default(); LANES];
+    for lane in lanes.iter() {
+        let place = &scene.records.places[hits.instance[lane] as usize];
+        let Some(t) = &scene.scene.materials[place.material].base_color_texture else { continue };
+        let uv = if t.uv_set == 0 { Vec2::new(u[lane], v[lane]) } else { mesh_point(scene, hits, lane).uv()[1] };
+        let texture = &scene.scene.textures[t.texture as usize];
+        footprints[lane] = Footprint::new(texture, t.transform.transform_point2(uv));
+    }
+    let mut texel = Column3([[1.0; LANES]; 3]);
+    for lane in lanes.iter() {
+        texel.set(lane, scene.decoder.filter(&footprints[lane]).truncate());
+    }
+    let base = vector(material, 0) * texel.wide();
+    [material[0], material[1], material[2]] = [base.x, base.y, base.z];
+}
+
+/// Multiplies what other textures and vertex colours say into the columns of the material.
 fn apply_textures(scene: &ShadeScene, hits: &Hits, lanes: Mask, uv: [f32x16; 2], material: &mut [f32x16; LANES]) {
     let [u, v] = uv.map(f32x16::to_array);
     let mut columns = material.map(f32x16::to_array);
@@ -183,9 +210,6 @@ fn apply_textures(scene: &ShadeScene, hits: &Hits, lanes: Mask, uv: [f32x16; 2],
             }
         };
         let texel = |t: &Option<TextureRef>| t.as_ref().map(|t| scene.decoder.lookup_ref(scene.scene, t, uv));
-        if let Some(t) = texel(&m.base_color_texture) {
-            multiply(0, &[t.x, t.y, t.z]);
-        }
         if mesh.colors.is_some() {
             multiply(0, &at().color().truncate().to_array());
         }
@@ -280,6 +304,10 @@ impl Surface {
         let p = vector(&g.geometry, 0) + e1 * hits.u + e2 * hits.v;
         let ng = (e1.cross(e2) * g.geometry[HANDEDNESS]).normalize();
         let weights = [splat(1.0) - hits.u - hits.v, hits.u, hits.v];
+        let base_textured = g.has(flag::BASE_TEXTURED);
+        if base_textured.any() {
+            apply_base_textures(scene, hits, base_textured, g.uv(weights), &mut g.material);
+        }
         let textured = g.has(flag::TEXTURED);
         if textured.any() {
             apply_textures(scene, hits, textured, g.uv(weights), &mut g.material);
