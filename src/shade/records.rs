@@ -1,4 +1,4 @@
-//! What shading reads of a hit, laid out for it: a cache line for a triangle's geometry, one for its vertex
+//! What shading reads of a hit, laid out for it: a cache line for a triangle's geometry, the next for its vertex
 //! attributes, one for a material. A mesh is stored once, however often it is placed.
 //!
 //! 64 bytes a triangle, 128 where there are shading normals or texture coordinates.
@@ -43,10 +43,10 @@ pub(super) mod flag {
 /// Where an instance's records are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
-    /// Line of the mesh's first triangle in [`Records::geometry`].
-    pub geometry: usize,
-    /// The same in [`Records::attributes`].
-    pub attributes: usize,
+    /// Line of the mesh's first triangle in [`Records::lines`].
+    first: usize,
+    /// Lines a triangle: 1, or 2 with attributes.
+    stride: usize,
     /// Index of the material.
     pub material: usize,
     /// Bits of [`flag`].
@@ -58,10 +58,9 @@ pub(super) struct Place {
 pub(super) struct Records {
     /// One an instance.
     pub places: Vec<Place>,
-    /// One a triangle of each mesh, in object space.
-    pub geometry: Vec<Line>,
-    /// One a triangle of each mesh that has normals or first texture coordinates.
-    pub attributes: Vec<Line>,
+    /// Geometry of each triangle of each mesh, in object space; after it its attributes, where the mesh has normals
+    /// or first texture coordinates.
+    pub lines: Vec<Line>,
     /// One a material: base colour, metallic, roughness, specular, specular colour, ior, transmission, absorption.
     pub materials: Vec<Line>,
 }
@@ -135,7 +134,6 @@ fn is_textured(material: &Material, mesh: &Mesh) -> bool {
 }
 
 fn flags(instance: &Instance, mesh: &Mesh, m: &Material) -> u32 {
-    let attributes = mesh.normals.is_some() || mesh.uvs[0].is_some();
     [
         (m.is_solid, flag::SOLID),
         (m.unlit || m.is_emissive(), flag::EMITTER),
@@ -146,7 +144,7 @@ fn flags(instance: &Instance, mesh: &Mesh, m: &Material) -> u32 {
         (is_textured(m, mesh), flag::TEXTURED),
         (m.base_color_texture.is_some(), flag::BASE_TEXTURED),
         (!instance.is_identity, flag::MOVED),
-        (attributes, flag::ATTRIBUTES),
+        (stride(mesh) == 2, flag::ATTRIBUTES),
     ]
     .into_iter()
     .filter_map(|(on, flag)| on.then_some(flag))
@@ -156,40 +154,49 @@ fn flags(instance: &Instance, mesh: &Mesh, m: &Material) -> u32 {
 impl Records {
     /// Lays out a scene, on all threads.
     pub fn new(scene: &Scene) -> Self {
-        let (mut lines, mut with_attributes) = (0, 0);
-        let firsts: Vec<[usize; 2]> = scene
+        let mut lines = 0;
+        let firsts: Vec<usize> = scene
             .meshes
             .iter()
             .map(|mesh| {
-                let first = [lines, with_attributes];
-                lines += mesh.triangles.len();
-                if mesh.normals.is_some() || mesh.uvs[0].is_some() {
-                    with_attributes += mesh.triangles.len();
-                }
+                let first = lines;
+                lines += mesh.triangles.len() * stride(mesh);
                 first
             })
             .collect();
         let place = |instance: &Instance| {
             let mesh = &scene.meshes[instance.mesh as usize];
-            let [geometry, attributes] = firsts[instance.mesh as usize];
             let material = mesh.material as usize;
-            Place { geometry, attributes, material, flags: flags(instance, mesh, &scene.materials[material]) }
+            let flags = flags(instance, mesh, &scene.materials[material]);
+            Place { first: firsts[instance.mesh as usize], stride: stride(mesh), material, flags }
         };
-        let all = |wanted: fn(&Mesh) -> bool, line: fn(&Mesh, [u32; 3]) -> Line| -> Vec<Line> {
-            scene
-                .meshes
-                .par_iter()
-                .filter(|mesh| wanted(mesh))
-                .flat_map_iter(|mesh| mesh.triangles.iter().map(move |&triangle| line(mesh, triangle)))
-                .collect()
+        let triangle = |mesh: &Mesh, t: [u32; 3]| {
+            let attributes = (stride(mesh) == 2).then(|| attributes(mesh, t));
+            std::iter::once(geometry(mesh, t)).chain(attributes)
         };
         Self {
             places: scene.instances.iter().map(place).collect(),
-            geometry: all(|_| true, geometry),
-            attributes: all(|mesh| mesh.normals.is_some() || mesh.uvs[0].is_some(), attributes),
+            lines: scene
+                .meshes
+                .par_iter()
+                .flat_map_iter(|mesh| mesh.triangles.iter().flat_map(move |&t| triangle(mesh, t)))
+                .collect(),
             materials: scene.materials.iter().map(material).collect(),
         }
     }
+}
+
+impl Place {
+    /// Where the lines of a triangle begin.
+    #[inline(always)]
+    pub fn line(&self, primitive: u32) -> usize {
+        self.first + primitive as usize * self.stride
+    }
+}
+
+/// Lines a triangle of `mesh`.
+fn stride(mesh: &Mesh) -> usize {
+    if mesh.normals.is_some() || mesh.uvs[0].is_some() { 2 } else { 1 }
 }
 
 /// The geometry of a line in the world.

@@ -85,23 +85,22 @@ impl Gathered {
         let mut flags = [0; LANES];
         for lane in active.iter() {
             let index = hits.instance[lane] as usize;
-            let triangle = hits.primitive[lane] as usize;
             let place = &records.places[index];
+            let at = place.line(hits.primitive[lane]);
             flags[lane] = place.flags;
             material[lane] = records.materials[place.material];
-            let line = &records.geometry[place.geometry + triangle];
+            let line = &records.lines[at];
             if place.flags & flag::MOVED == 0 {
                 geometry[lane] = *line;
                 if place.flags & flag::ATTRIBUTES != 0 {
-                    attributes[lane] = records.attributes[place.attributes + triangle];
+                    attributes[lane] = records.lines[at + 1];
                 }
                 continue;
             }
             let placement = &scene.placements[index];
             geometry[lane] = records::moved_geometry(line, &scene.scene.instances[index], placement);
             if place.flags & flag::ATTRIBUTES != 0 {
-                let line = &records.attributes[place.attributes + triangle];
-                attributes[lane] = records::moved_attributes(line, placement);
+                attributes[lane] = records::moved_attributes(&records.lines[at + 1], placement);
             }
         }
         let mut gathered = Self {
