@@ -1,5 +1,5 @@
 # What a person types. Everything is built in the release profile: the tests are statistical.
-.PHONY: demo test bench lint
+.PHONY: demo test bench bench-ci bench-record bench-scaling lint
 
 # rustup's folder, where a shell has not been told of it yet.
 export PATH := $(PATH):$(HOME)/.cargo/bin
@@ -16,10 +16,28 @@ test:
 	./setup
 	cargo test --release --workspace
 
-# Criterion benches; they print the ratios that matter and assert nothing.
+# Criterion benches, their pages in target/criterion/, then one table of ratios and targets, also in target/bench.md.
+# One row again: cargo bench --bench table -- NAME [--quick]; the names: cargo bench --bench table -- --list
 bench:
 	./setup
-	cargo bench
+	cargo bench --bench accel --bench shade --bench shift --bench reconstruct --bench render
+	cargo bench --bench table
+
+# Every bench once, then ratios and counted instructions against benches/expected.toml; fails out of band.
+bench-ci:
+	./setup bench
+	cargo bench -- --test
+	cargo bench --bench ci
+
+# Stores what is measured now as what bench-ci compares with.
+bench-record:
+	./setup bench
+	cargo bench --bench ci -- --record
+
+# Time and memory as the work grows: plots and exponents in target/bench-scaling/.
+bench-scaling:
+	./setup
+	cargo bench --bench scaling
 
 # Formatting, clippy and the documentation, each without a warning.
 lint:

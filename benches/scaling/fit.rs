@@ -1,0 +1,36 @@
+//! Power laws: y = factor · x^exponent by least squares on logarithms.
+
+/// A fitted power law.
+#[derive(Clone, Copy, Debug)]
+pub struct Fit {
+    /// Of x.
+    pub exponent: f64,
+    factor: f64,
+    /// The smallest and the largest x it was fitted to.
+    pub range: [f64; 2],
+}
+
+impl Fit {
+    /// Its value at `x`.
+    pub fn at(&self, x: f64) -> f64 {
+        self.factor * x.powf(self.exponent)
+    }
+}
+
+/// Fits the points, in ascending order of x, whose x is in the upper half of the range on a logarithmic scale; `None`
+/// below two of them.
+pub fn upper_half(points: &[(f64, f64)]) -> Option<Fit> {
+    let [low, high] = [points.first()?.0, points.last()?.0];
+    let middle = (low * high).sqrt();
+    let upper: Vec<_> = points.iter().filter(|(x, _)| *x >= middle).copied().collect();
+    // Two points of a short range, rather than one.
+    let chosen = if upper.len() < 2 { points } else { &upper };
+    let logs = || chosen.iter().map(|(x, y)| (x.ln(), y.ln()));
+    let n = chosen.len() as f64;
+    let mean = logs().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x / n, sum.1 + y / n));
+    let (xx, xy) = logs()
+        .fold((0.0, 0.0), |sum, (x, y)| (sum.0 + (x - mean.0).powi(2), sum.1 + (x - mean.0) * (y - mean.1)));
+    let exponent = xy / xx;
+    let range = [chosen.first()?.0, high];
+    (xx > 0.0).then(|| Fit { exponent, factor: (mean.1 - exponent * mean.0).exp(), range })
+}

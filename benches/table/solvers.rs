@@ -1,0 +1,39 @@
+//! The solves at 1920×1080: time on all threads and memory.
+
+use super::{Effort, process};
+use gdpt::reconstruct::{Input, reconstruct};
+use gdpt_bench::fixtures::noisy_planes;
+use gdpt_bench::kernels::SOLVERS;
+use gdpt_bench::measure::{Rounds, Side, cost};
+use gdpt_bench::render::{cpus, pool};
+use gdpt_bench::table::{Row, Target, seconds};
+
+/// Seconds on two cores that are asked for.
+fn target(solver: &str) -> Target {
+    match solver {
+        "L2" => Target::AtMost(0.15),
+        "L1" => Target::AtMost(1.5),
+        _ => Target::None,
+    }
+}
+
+pub fn rows(effort: &Effort) -> Vec<Row> {
+    let [width, height] = effort.size([1920, 1080]);
+    let planes = noisy_planes(width as usize, height as usize);
+    let pool = pool(cpus());
+    let sides = SOLVERS.map(|(_, method)| -> Side<'_> {
+        let [primal, dx, dy] = &planes;
+        let input = Input { primal, dx, dy };
+        let pool = &pool;
+        Box::new(move || pool.install(|| cost(|| reconstruct(&input, method, 0.2))))
+    });
+    let rounds = Rounds::alternate(effort.rounds, sides.into());
+    let mut rows = Vec::new();
+    for (side, (name, _)) in SOLVERS.iter().enumerate() {
+        let cost = rounds.cost(side);
+        let label = format!("{name} solve, {width}×{height}, {} threads, wall seconds", cpus());
+        rows.push(Row::value(label, cost.wall, "s", &seconds(cost), target(name)));
+        rows.push(process::solve_memory(name, [width, height]));
+    }
+    rows
+}
