@@ -4,7 +4,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use gdpt::accel::Hits;
 use gdpt::math::{LANES, Mask, Vec3x, f32x16, lanes, splat};
 use gdpt::scene::{Environment, Instance, Material, Mesh, Scene, Texture, TextureRef, Wrap};
-use gdpt::shade::{ShadeScene, Surface};
+use gdpt::shade::{Receiver, ShadeScene, Surface};
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec3A, Vec4};
 use std::f32::consts::FRAC_1_SQRT_2;
 use std::hint::black_box;
@@ -116,10 +116,11 @@ fn shade(c: &mut Criterion) {
     for (name, scene) in [("triangles_and_sky", &lamp), ("sky", &dark)] {
         let prepared = ShadeScene::new(scene);
         let p = Vec3x::splat(Vec3::new(3.0, 0.0, 4.0));
+        let from = Receiver { p, n: Vec3x::splat(Vec3::Y), both_sides: Mask::NONE };
         group.bench_function(format!("light_sample/{name}"), |b| {
-            b.iter(|| prepared.lights.sample(&prepared, black_box(u), v, w));
+            b.iter(|| prepared.lights.sample(&prepared, &from, Mask::ALL, black_box(u), v, w));
         });
-        let point = prepared.lights.sample(&prepared, u, v, w);
+        let point = prepared.lights.sample(&prepared, &from, Mask::ALL, u, v, w);
         group.bench_function(format!("light_seen/{name}"), |b| {
             b.iter(|| prepared.lights.seen_from(&prepared, black_box(&point), p));
         });

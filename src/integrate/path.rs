@@ -19,7 +19,7 @@ pub fn first_arrival(wo: crate::math::Vec3x) -> Arrival {
         beta: Rgb::grey(1.0),
         tau: Rgb::grey(1.0),
         eta_squared: splat(1.0),
-        bsdf_pdf: f32x16::splat(-1.0),
+        emission_weight: f32x16::ZERO,
     }
 }
 

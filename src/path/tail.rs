@@ -34,9 +34,9 @@ pub struct Waiting {
     pub tau: [f32; 3],
     /// Squared product of relative indices along the path.
     pub eta_squared: f32,
-    /// Solid-angle pdf of the direction it came by; 0 after a Dirac event, negative where the emission of this
-    /// vertex is already accounted for.
-    pub bsdf_pdf: f32,
+    /// Weight of what this vertex emits, against light sampling at the vertex before; 0 where that emission is
+    /// already accounted for.
+    pub emission_weight: f32,
 }
 
 /// What one sample of one pixel has gathered.
@@ -91,7 +91,7 @@ impl Queues {
                     beta: rgb(&arrival.beta),
                     tau: rgb(&arrival.tau),
                     eta_squared: arrival.eta_squared.as_array()[i],
-                    bsdf_pdf: arrival.bsdf_pdf.as_array()[i],
+                    emission_weight: arrival.emission_weight.as_array()[i],
                 },
             );
         }
@@ -109,8 +109,8 @@ pub struct Arrival {
     pub tau: Rgb,
     /// Squared product of relative indices.
     pub eta_squared: f32x16,
-    /// pdf of the direction they came by; 0 after Dirac, negative where emission is accounted for.
-    pub bsdf_pdf: f32x16,
+    /// Weight of what they meet there; 0 where its emission is accounted for.
+    pub emission_weight: f32x16,
 }
 
 /// Sixteen waiting paths, turned into lanes.
@@ -150,7 +150,7 @@ impl Packet {
                 beta: rgb(|w| w.beta),
                 tau: rgb(|w| w.tau),
                 eta_squared: lanes(|i| at(i).eta_squared),
-                bsdf_pdf: lanes(|i| at(i).bsdf_pdf),
+                emission_weight: lanes(|i| at(i).emission_weight),
             },
         }
     }
@@ -208,13 +208,11 @@ fn step<A: Accel>(
     slots: &mut [Slot],
     limits: &Limits,
 ) {
-    let Arrival { wo, beta, tau, mut eta_squared, bsdf_pdf } = packet.arrival;
+    let Arrival { wo, beta, tau, mut eta_squared, emission_weight: weight } = packet.arrival;
     let surface = Surface::new(tracer.scene, &packet.hits, packet.active, wo);
 
     // What the vertex emits, unless the head has already counted it.
-    let fresh = packet.active & bsdf_pdf.ge(f32x16::ZERO);
-    let weight = emission_weight(bsdf_pdf, light_pdf(&surface, -wo, packet.hits.t));
-    packet.gather(slots, fresh & surface.is_emitter, beta, tau, surface.emission * weight);
+    packet.gather(slots, packet.active & surface.is_emitter, beta, tau, surface.emission * weight);
     if depth >= limits.max_depth {
         return;
     }
@@ -231,8 +229,11 @@ fn step<A: Accel>(
     let (beta, tau) = (beta * factor, tau * factor);
     let bsdf_pdf = next.sample.dirac.select(f32x16::ZERO, next.sample.pdf);
     gather_environment(tracer, packet, &next, bsdf_pdf, beta, tau, slots);
-    let arrival = Arrival { wo: -next.sample.wi, beta, tau, eta_squared, bsdf_pdf };
-    queues.push_lanes(depth + 1, next.active & next.hits.valid, &packet.slots, &next.hits, &arrival);
+    let arrived = next.active & next.hits.valid;
+    let found = light_pdf(tracer.scene, &surface, next.sample.wi, &next.hits, arrived);
+    let weight = emission_weight(bsdf_pdf, found);
+    let arrival = Arrival { wo: -next.sample.wi, beta, tau, eta_squared, emission_weight: weight };
+    queues.push_lanes(depth + 1, arrived, &packet.slots, &next.hits, &arrival);
 }
 
 /// Light from infinity for the lanes that left the scene.

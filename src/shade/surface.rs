@@ -28,8 +28,6 @@ pub struct Surface {
     two_sided: Mask,
     /// On an emissive or unlit surface, whichever side.
     pub is_emitter: Mask,
-    /// Area pdf with which light sampling picks this point, m⁻²; 0 where it never does.
-    pub light_pdf: f32x16,
     /// Base colour.
     pub albedo: Rgb,
     /// Bound on the rounding of `p`, m.
@@ -76,7 +74,6 @@ struct Gathered {
     transmission: Column,
     absorption: Column3,
     emission: Column3,
-    light_pdf: Column,
     /// Bit sets over the lanes.
     bits: Flags,
 }
@@ -212,7 +209,6 @@ impl Gathered {
             let s = material.normal_scale;
             self.mapped.set(lane, texel * Vec3::new(s, s, 1.0));
         }
-        self.light_pdf[lane] = scene.lights.triangle_pdf(index, primitive);
         self.material(scene, material, &at, uv, lane);
     }
 
@@ -313,7 +309,6 @@ impl Surface {
             emitted,
             two_sided,
             is_emitter: Mask::from_bits(g.bits.emitter),
-            light_pdf: f32x16::new(g.light_pdf),
             albedo: base,
             offset: f32x16::new(g.offset),
         })
@@ -333,16 +328,4 @@ impl Surface {
     }
 }
 
-crate::lanewise!(Surface {
-    p,
-    ng,
-    wo,
-    bsdf,
-    emission,
-    emitted,
-    two_sided,
-    is_emitter,
-    light_pdf,
-    albedo,
-    offset
-});
+crate::lanewise!(Surface { p, ng, wo, bsdf, emission, emitted, two_sided, is_emitter, albedo, offset });
