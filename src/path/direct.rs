@@ -88,6 +88,7 @@ pub fn shadow<A: Accel>(
 }
 
 /// Draws a light point for the base vertices x_`depth` and settles its visibility.
+#[inline(always)]
 pub fn sample<A: Accel>(
     tracer: &mut Tracer<'_, A>,
     surface: &Surface,

@@ -295,7 +295,7 @@ impl LightTree {
         self.leaves.push((self.bins.len() as u32, items.len() as u32));
         self.bins.extend_from_slice(table.bins());
         for (i, item) in items.iter().enumerate() {
-            self.order.push(item.light);
+            self.order.push((item.light, table.pdf(i)));
             self.places[item.light as usize] = Place { trail, pdf: table.pdf(i) };
         }
         LEAF | (self.leaves.len() as u32 - 1)

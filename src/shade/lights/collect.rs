@@ -4,7 +4,7 @@ use super::build::Emitter;
 use super::tree::LightTree;
 use super::{LightTriangle, Lights, NO_LIGHT};
 use crate::math::alias::AliasTable;
-use crate::scene::{PunctualKind, PunctualLight, Scene};
+use crate::scene::{Material, PunctualKind, PunctualLight, Scene};
 use crate::shade::env::EnvironmentTable;
 use crate::shade::texture::Decoder;
 use crate::shade::{corners, offset_bound};
@@ -102,7 +102,7 @@ impl Lights {
             let sides = if material.double_sided { 2.0 } else { 1.0 };
             for (primitive, &triangle) in mesh.triangles.iter().enumerate() {
                 let corners = corners(instance, &mesh.positions, triangle);
-                let mut light = LightTriangle::new(corners, handedness[index], material.double_sided);
+                let mut light = LightTriangle::new(corners, handedness[index], material);
                 let area = 0.5 * f64::from(light.edges[0].cross(light.edges[1]).length());
                 let power = radiance * PI * sides * area;
                 if !counts(power) {
@@ -121,8 +121,8 @@ impl Lights {
 }
 
 impl LightTriangle {
-    /// The geometry of an emissive triangle.
-    fn new(corners: [Vec3; 3], handedness: f32, two_sided: bool) -> Self {
+    /// An emissive triangle; whose it is comes later.
+    fn new(corners: [Vec3; 3], handedness: f32, material: &Material) -> Self {
         let edges = [corners[1] - corners[0], corners[2] - corners[0]];
         let cross = edges[0].cross(edges[1]) * handedness;
         Self {
@@ -131,9 +131,11 @@ impl LightTriangle {
             normal: cross.normalize_or_zero(),
             instance: 0,
             primitive: 0,
-            two_sided,
+            two_sided: material.double_sided,
             offset: offset_bound(corners),
             inverse_area: 2.0 / cross.length(),
+            constant: (material.emission_texture.is_none() && !material.has_coverage())
+                .then_some(material.emission),
         }
     }
 }

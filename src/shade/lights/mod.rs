@@ -86,6 +86,8 @@ struct LightTriangle {
     offset: f32,
     /// 1 / area, m⁻².
     inverse_area: f32,
+    /// Radiance, where no texture and no coverage make it vary.
+    constant: Option<Vec3>,
 }
 
 /// Sixteen points on lights, or directions to infinite ones, drawn for sixteen receivers.
@@ -105,12 +107,8 @@ pub struct LightPoint {
     pub ng: Vec3x,
     /// m⁻² (area), sr⁻¹ (environment), probability (Dirac): selection by the receiver it was drawn for included.
     pub pdf: f32x16,
-    /// The light in the tree; 0 where `in_tree` is not set.
+    /// The light in the tree; unspecified for infinite ones.
     light: [u32; LANES],
-    /// Selected by the tree.
-    in_tree: Mask,
-    /// `pdf` ÷ probability of the light in the tree.
-    density: f32x16,
     /// Environment or directional: `p` is a direction.
     is_infinite: Mask,
     /// Emits on both sides.
@@ -172,35 +170,40 @@ impl Lights {
         if self.is_empty() {
             return point;
         }
-        let (mut outcome, mut rest) = ([TREE; LANES], u_select.to_array());
+        let (mut outcome, mut rest) = ([TREE; LANES], u_select);
+        let mut in_tree = active;
         if self.table.len() > 1 {
+            let mut u = rest.to_array();
             for lane in active.iter() {
-                (outcome[lane], rest[lane]) = self.table.sample(rest[lane]);
+                (outcome[lane], u[lane]) = self.table.sample(u[lane]);
             }
+            rest = f32x16::new(u);
+            in_tree = active & Mask::from_fn(|lane| outcome[lane] == TREE);
         }
-        point.in_tree = active & Mask::from_fn(|lane| outcome[lane] == TREE);
-        let (light, selection) = self.tree.select(from, f32x16::new(rest), point.in_tree);
+        let (light, selection) = self.tree.select(from, rest, in_tree);
         point.light = light;
 
         let (b1, b2) = square_to_triangle(u, v);
         let (b1, b2) = (b1.to_array(), b2.to_array());
         let mut gather = Gather::default();
-        for lane in active.iter() {
-            gather.density[lane] = self.table.pdf(outcome[lane]);
-            if let Some(directional) = outcome[lane].checked_sub(TREE + 1) {
-                match self.directional.get(directional) {
-                    Some(light) => gather.punctual(light, lane),
-                    None => gather.env |= 1 << lane,
-                }
-            } else if let Some(triangle) = self.triangles.get(light[lane] as usize) {
+        for lane in in_tree.iter() {
+            if let Some(triangle) = self.triangles.get(light[lane] as usize) {
                 gather.triangle(s, triangle, b1[lane], b2[lane], lane);
-                gather.density[lane] *= triangle.inverse_area;
             } else {
                 gather.punctual(&self.placed[light[lane] as usize - self.triangles.len()], lane);
+                gather.density[lane] = 1.0;
+            }
+        }
+        for lane in active.and_not(in_tree).iter() {
+            gather.density[lane] = self.table.pdf(outcome[lane]);
+            match self.directional.get(outcome[lane] - TREE - 1) {
+                Some(light) => gather.punctual(light, lane),
+                None => gather.env |= 1 << lane,
             }
         }
         gather.finish(&mut point);
-        point.pdf = point.in_tree.select(point.density * selection, point.density);
+        let density = f32x16::new(gather.density);
+        point.pdf = in_tree.select(density * (selection * splat(self.table.pdf(TREE))), density);
         if let Some(environment) = self.environment.as_ref().filter(|_| point.is_env.any()) {
             let (direction, pdf) = environment.sample(u, v);
             point.p = point.is_env.select(direction, point.p);
@@ -213,33 +216,42 @@ impl Lights {
 
     /// The pdf `point` would have had if it had been drawn for `from`, in the measure of `point.pdf`; asked for the
     /// `active` lanes.
-    #[inline]
+    #[inline(always)]
     pub fn pdf_from(&self, point: &LightPoint, from: &Receiver, active: Mask) -> f32x16 {
-        let asked = active & point.in_tree;
+        let asked = (active & point.valid).and_not(point.is_infinite);
         if !self.tree.looks_at_receiver() || asked.none() {
             return point.pdf;
         }
-        let selection = self.tree.probability(from, &point.light, asked);
-        asked.select(point.density * selection, point.pdf)
+        let mut density = [1.0; LANES];
+        for lane in (asked & point.is_area).iter() {
+            density[lane] = self.triangles[point.light[lane] as usize].inverse_area;
+        }
+        let selection = self.tree.probability(from, &point.light, asked) * splat(self.table.pdf(TREE));
+        asked.select(f32x16::new(density) * selection, point.pdf)
     }
 
     /// Solid-angle pdf, sr⁻¹, with which light sampling for `from` finds the points `hits` in direction `wi`; 0 where
     /// they are not on a sampled light. If distance and direction are those of another vertex, the density is in
     /// that vertex's solid angle.
-    #[inline]
+    #[inline(always)]
     pub fn hit_pdf(&self, from: &Receiver, hits: &Hits, wi: Vec3x, active: Mask) -> f32x16 {
         let mut on_light = 0;
-        let mut light = [0; LANES];
         for lane in (active & hits.valid).iter() {
-            if let Some(first) = self.first[hits.instance[lane] as usize] {
-                light[lane] = self.of_triangle[(first + hits.primitive[lane]) as usize];
-                on_light |= u16::from(light[lane] != NO_LIGHT) << lane;
-            }
+            on_light |= u16::from(self.first[hits.instance[lane] as usize].is_some()) << lane;
+        }
+        if on_light == 0 { f32x16::ZERO } else { self.emitter_pdf(from, hits, wi, Mask::from_bits(on_light)) }
+    }
+
+    /// [`Lights::hit_pdf`] for `active` lanes that are on emissive instances.
+    fn emitter_pdf(&self, from: &Receiver, hits: &Hits, wi: Vec3x, active: Mask) -> f32x16 {
+        let mut on_light = 0;
+        let mut light = [0; LANES];
+        for lane in active.iter() {
+            let first = self.first[hits.instance[lane] as usize].unwrap_or(0);
+            light[lane] = self.of_triangle[(first + hits.primitive[lane]) as usize];
+            on_light |= u16::from(light[lane] != NO_LIGHT) << lane;
         }
         let on_light = Mask::from_bits(on_light);
-        if on_light.none() {
-            return f32x16::ZERO;
-        }
         let (mut inverse_area, mut normal) = ([0.0; LANES], [Vec3::ZERO; LANES]);
         for lane in on_light.iter() {
             let triangle = &self.triangles[light[lane] as usize];
@@ -312,13 +324,16 @@ struct Gather {
 
 impl Gather {
     fn triangle(&mut self, s: &ShadeScene, t: &LightTriangle, u: f32, v: f32, lane: usize) {
-        let instance = &s.scene.instances[t.instance as usize];
-        let mesh = &s.scene.meshes[instance.mesh as usize];
-        let (emission, coverage) = s.decoder.emission(s.scene, &MeshPoint::new(mesh, t.primitive, u, v));
+        self.emission[lane] = t.constant.unwrap_or_else(|| {
+            let instance = &s.scene.instances[t.instance as usize];
+            let mesh = &s.scene.meshes[instance.mesh as usize];
+            let (emission, coverage) = s.decoder.emission(s.scene, &MeshPoint::new(mesh, t.primitive, u, v));
+            emission * coverage
+        });
         self.p[lane] = t.corner + t.edges[0] * u + t.edges[1] * v;
         self.ng[lane] = t.normal;
-        self.emission[lane] = emission * coverage;
         self.offset[lane] = t.offset;
+        self.density[lane] = t.inverse_area;
         self.area |= 1 << lane;
         self.two_sided |= u16::from(t.two_sided) << lane;
     }
@@ -352,7 +367,6 @@ impl Gather {
         point.p = Vec3x::lanes(|i| self.p[i]);
         point.ng = Vec3x::lanes(|i| self.ng[i]);
         point.emission = Vec3x::lanes(|i| self.emission[i]);
-        point.density = f32x16::new(self.density);
         point.spot_scale = f32x16::new(self.spot_scale);
         point.spot_shift = f32x16::new(self.spot_shift);
         point.offset = f32x16::new(self.offset);

@@ -65,8 +65,8 @@ pub(super) struct LightTree {
     pub leaves: Vec<(u32, u32)>,
     /// Alias tables of the leaves.
     pub bins: Vec<Bin>,
-    /// The lights, leaf by leaf.
-    pub order: Vec<u32>,
+    /// The lights, leaf by leaf, with their probabilities in the leaf.
+    pub order: Vec<(u32, f32)>,
     /// By light.
     pub places: Vec<Place>,
 }
@@ -78,6 +78,15 @@ struct Level {
     /// By child.
     columns: [f32x16; WIDTH],
     total: f32x16,
+}
+
+/// Sixteen walks through the tree.
+struct Way {
+    /// Where they are.
+    at: [u32; LANES],
+    /// What is left of the random numbers.
+    u: f32x16,
+    probability: f32x16,
 }
 
 impl Node {
@@ -142,17 +151,32 @@ impl LightTree {
     }
 
     /// Selects a light for each `active` lane by `u` in [0, 1), and with which probability.
+    #[inline(always)]
     pub fn select(&self, from: &Receiver, u: f32x16, active: Mask) -> ([u32; LANES], f32x16) {
+        let mut way = Way { at: [self.root; LANES], u, probability: splat(1.0) };
+        if self.looks_at_receiver() {
+            self.descend(from, active, &mut way);
+        }
+        let (mut light, mut in_leaf) = ([0; LANES], [0.0; LANES]);
+        for lane in active.iter() {
+            let (first, count) = self.leaves[(way.at[lane] & !LEAF) as usize];
+            let (first, count) = (first as usize, count as usize);
+            let (k, _) = draw(&self.bins[first..first + count], way.u.as_array()[lane]);
+            (light[lane], in_leaf[lane]) = self.order[first + k];
+        }
+        (light, way.probability * f32x16::new(in_leaf))
+    }
+
+    /// Walks from the root to a leaf in each `active` lane.
+    fn descend(&self, from: &Receiver, active: Mask, way: &mut Way) {
         let (zero, one) = (f32x16::ZERO, splat(1.0));
-        let mut at = [self.root; LANES];
-        let (mut u, mut probability) = (u, one);
         let mirror = from.mirror();
-        let mut pending = if self.looks_at_receiver() { active } else { Mask::NONE };
+        let mut pending = active;
         while pending.any() {
-            let level = self.level(from, &mirror, &at, pending);
+            let level = self.level(from, &mirror, &way.at, pending);
             // Children up to the chosen one: the first whose running sum exceeds x. Rounding cannot lead to a child
             // of importance 0: u ≤ 1 − 2⁻²⁴ keeps x below the total.
-            let x = u * level.total;
+            let x = way.u * level.total;
             let (mut running, mut below, mut mass, mut index) = (zero, zero, zero, zero);
             let mut passing = Mask::ALL;
             for column in level.columns {
@@ -163,27 +187,18 @@ impl LightTree {
                 index += passed.keep(one);
                 passing = passed;
             }
-            u = pending.select(((x - below) / mass).fast_min(splat(BELOW_ONE)), u);
-            probability = pending.select(probability * (mass / level.total), probability);
+            way.u = pending.select(((x - below) / mass).fast_min(splat(BELOW_ONE)), way.u);
+            way.probability = pending.select(way.probability * (mass / level.total), way.probability);
             let mut inner = 0;
             for lane in pending.iter() {
                 // Beyond the last child only where importances are not finite.
                 let child = (index.as_array()[lane] as usize).min(WIDTH - 1);
-                at[lane] = self.nodes[at[lane] as usize].child[child];
-                inner |= u16::from(at[lane] & LEAF == 0) << lane;
+                let link = self.nodes[way.at[lane] as usize].child[child];
+                way.at[lane] = link;
+                inner |= u16::from(link & LEAF == 0) << lane;
             }
             pending = Mask::from_bits(inner);
         }
-        let mut light = [0; LANES];
-        let mut in_leaf = [0.0; LANES];
-        for lane in active.iter() {
-            let (first, count) = self.leaves[(at[lane] & !LEAF) as usize];
-            let (first, count) = (first as usize, count as usize);
-            let (k, _) = draw(&self.bins[first..first + count], u.as_array()[lane]);
-            light[lane] = self.order[first + k];
-            in_leaf[lane] = self.places[light[lane] as usize].pdf;
-        }
-        (light, probability * f32x16::new(in_leaf))
     }
 
     /// The probability with which [`LightTree::select`] finds `light`, for the `active` lanes.
