@@ -34,8 +34,6 @@ pub struct Surface {
     two_sided: Mask,
     /// On an emissive or unlit surface, whichever side.
     pub is_emitter: Mask,
-    /// Area pdf with which light sampling picks this point, m⁻²; 0 where it never does.
-    pub light_pdf: f32x16,
     /// Base colour.
     pub albedo: Rgb,
     /// Bound on the rounding of `p`, m.
@@ -283,10 +281,9 @@ impl NormalMap {
     }
 }
 
-/// Radiance and area pdf of the lanes on emissive or unlit surfaces; `base` is their base colour.
-fn emission(scene: &ShadeScene, hits: &Hits, emitters: Mask, base: Rgb) -> (Rgb, f32x16) {
+/// Radiance of the lanes on emissive or unlit surfaces; `base` is their base colour.
+fn emission(scene: &ShadeScene, hits: &Hits, emitters: Mask, base: Rgb) -> Rgb {
     let mut radiance = Column3::default();
-    let mut pdf = [0.0; LANES];
     for lane in emitters.iter() {
         let at = mesh_point(scene, hits, lane);
         let material = &scene.scene.materials[at.mesh.material as usize];
@@ -297,9 +294,8 @@ fn emission(scene: &ShadeScene, hits: &Hits, emitters: Mask, base: Rgb) -> (Rgb,
         let texture = material.emission_texture.as_ref();
         let texel = texture.map_or(Vec4::ONE, |t| scene.decoder.lookup_ref(scene.scene, t, at.uv()));
         radiance.set(lane, material.emission * texel.truncate());
-        pdf[lane] = scene.lights.triangle_pdf(hits.instance[lane] as usize, hits.primitive[lane]);
     }
-    (radiance.wide(), f32x16::new(pdf))
+    radiance.wide()
 }
 
 impl Surface {
@@ -327,9 +323,9 @@ impl Surface {
         let base = parameters.base;
         let mut bsdf = Bsdf::new(frame, &parameters);
         let is_emitter = g.has(flag::EMITTER);
-        let (mut emitted, mut light_pdf) = (Rgb::ZERO, f32x16::ZERO);
+        let mut emitted = Rgb::ZERO;
         if is_emitter.any() {
-            (emitted, light_pdf) = emission(scene, hits, is_emitter, base);
+            emitted = emission(scene, hits, is_emitter, base);
             bsdf = g.has(flag::UNLIT).select(Bsdf::black(frame), bsdf);
         }
         let two_sided = g.has(flag::TWO_SIDED);
@@ -343,7 +339,6 @@ impl Surface {
             emitted,
             two_sided,
             is_emitter,
-            light_pdf,
             albedo: base,
             offset: g.geometry[OFFSET],
         }
@@ -363,16 +358,4 @@ impl Surface {
     }
 }
 
-crate::lanewise!(Surface {
-    p,
-    ng,
-    wo,
-    bsdf,
-    emission,
-    emitted,
-    two_sided,
-    is_emitter,
-    light_pdf,
-    albedo,
-    offset
-});
+crate::lanewise!(Surface { p, ng, wo, bsdf, emission, emitted, two_sided, is_emitter, albedo, offset });
