@@ -299,8 +299,8 @@ fn emission(scene: &ShadeScene, hits: &Hits, emitters: Mask, base: Rgb) -> Rgb {
 }
 
 impl Surface {
-    /// Evaluates the `active` lanes that hit something; the other lanes scatter and emit nothing, and their `p` has
-    /// no meaning. `wo` points back along the rays.
+    /// Evaluates the `active` lanes that hit something; the other lanes lie at the origin and scatter and emit nothing.
+    /// `wo` points back along the rays.
     pub fn new(scene: &ShadeScene, hits: &Hits, active: Mask, wo: Vec3x) -> Self {
         let active = active & hits.valid;
         let mut g = Gathered::new(scene, hits, active);
@@ -331,8 +331,8 @@ impl Surface {
         let two_sided = g.has(flag::TWO_SIDED);
         let lit_side = wo.dot(ng).gt(f32x16::ZERO) | two_sided;
         Self {
-            p,
-            ng,
+            p: active.keep(p),
+            ng: active.keep(ng),
             wo,
             bsdf,
             emission: lit_side.keep(emitted),

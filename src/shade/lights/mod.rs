@@ -238,6 +238,9 @@ impl Lights {
     /// that vertex's solid angle.
     #[inline(always)]
     pub fn hit_pdf(&self, from: &Receiver, hits: &Hits, wi: Vec3x, active: Mask) -> f32x16 {
+        if self.is_empty() {
+            return f32x16::ZERO;
+        }
         let mut on_light = 0;
         for lane in (active & hits.valid).iter() {
             on_light |= u16::from(self.first[hits.instance[lane] as usize].is_some()) << lane;
