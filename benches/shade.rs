@@ -3,7 +3,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use gdpt::math::{LANES, Mask, Vec3x};
 use gdpt::scene::Material;
-use gdpt::shade::{ShadeScene, Surface};
+use gdpt::shade::{Receiver, ShadeScene, Surface};
 use gdpt_bench::fixtures::{fields, hits, materials, uniform};
 use glam::Vec3;
 use std::f32::consts::FRAC_1_SQRT_2;
@@ -34,10 +34,11 @@ fn shade(c: &mut Criterion) {
     for (name, scene) in [("triangles_and_sky", &lamp), ("sky", &dark)] {
         let prepared = ShadeScene::new(scene);
         let p = Vec3x::splat(Vec3::new(3.0, 0.0, 4.0));
+        let from = Receiver { p, n: Vec3x::splat(Vec3::Y), both_sides: Mask::NONE };
         group.bench_function(format!("light_sample/{name}"), |b| {
-            b.iter(|| prepared.lights.sample(&prepared, black_box(u), v, w));
+            b.iter(|| prepared.lights.sample(&prepared, &from, Mask::ALL, black_box(u), v, w));
         });
-        let point = prepared.lights.sample(&prepared, u, v, w);
+        let point = prepared.lights.sample(&prepared, &from, Mask::ALL, u, v, w);
         group.bench_function(format!("light_seen/{name}"), |b| {
             b.iter(|| prepared.lights.seen_from(&prepared, black_box(&point), p));
         });

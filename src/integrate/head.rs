@@ -11,12 +11,12 @@ use crate::accel::{Accel, Coherence, Rays};
 use crate::math::{Compare, Mask, Rgb, Vec3x, f32x16, splat};
 use crate::path::bounce::{Bounce, absorption, bounce, light_pdf};
 use crate::path::direct::{self, DirectLight, Lit};
-use crate::path::shift::{PairWeights, half_vector, is_diffuse, plan, reconnect};
 use crate::path::queue::{Arrival, Queues};
+use crate::path::shift::{PairWeights, half_vector, is_diffuse, plan, reconnect};
 use crate::path::tail::emission_weight;
 use crate::path::trace::Tracer;
 use crate::path::{Limits, Streams};
-use crate::shade::Surface;
+use crate::shade::{Receiver, Surface};
 
 /// One offset path a lane.
 #[derive(Clone, Copy, Default)]
@@ -156,8 +156,9 @@ impl Head {
                 let (seen, pdf_ratio) =
                     offset_light(tracer, &self.surface, offset, &light, evaluated, coherence);
                 radiance = evaluated.select(seen, radiance);
-                // J ℓ_y / ℓ_x is 1: base and offset use the same point. Occlusion zeroes f and b, never ℓ.
-                offset_weight = evaluated.select(r2 * (splat(1.0) + pdf_ratio * pdf_ratio), offset_weight);
+                // Occlusion zeroes f and b, never ℓ.
+                let own = offset_light_ratio(tracer, offset, &light, evaluated);
+                offset_weight = evaluated.select(r2 * (own * own + pdf_ratio * pdf_ratio), offset_weight);
             }
             let weight = walk.weights().weight(base_weight, offset_weight);
             let difference = offset.beta * radiance - base;
@@ -184,7 +185,7 @@ impl Head {
             limits,
             self.active,
         );
-        let next = arrive(tracer, walk, &step);
+        let next = arrive(tracer, walk, &self.surface, &step);
         let beta = self.beta * step.factor();
         let dirac_pdf = step.sample.dirac.select(f32x16::ZERO, step.sample.pdf);
         let seen = (step.active & (next.sky | next.vertex.is_emitter)).keep(next.radiance);
@@ -237,7 +238,7 @@ impl Head {
             tau: Rgb::grey(1.0),
             tail: Rgb::ZERO,
             eta_squared: self.eta_squared,
-            bsdf_pdf: splat(-1.0),
+            emission_weight: f32x16::ZERO,
         };
         queues.push(depth, settled, &arrival);
         self.active = self.active.and_not(settled);
@@ -345,12 +346,18 @@ impl Head {
         let inverse = splat(1.0) / (step.sample.pdf * step.survival);
         out.beta = lanes.select(offset.beta * f * inverse, out.beta);
         out.ratio = lanes.select(offset.ratio * b, out.ratio);
-        // J ℓ_y = ℓ_x: the light's own measure cancels. It stays in the weight where the way is blocked.
+        // J ℓ_y: it stays in the weight where the way is blocked.
+        let on_light = lanes & next.vertex.is_emitter;
+        let found = light_pdf(tracer.scene, y, step.sample.wi, &step.hits, on_light) / step.sample.pdf;
+        let light_ratio2 = on_light.select(found * found, next.light_ratio2);
         let r2 = offset.ratio * offset.ratio;
-        out.weight = lanes.select(r2 * (next.light_ratio2 + b * b), out.weight);
+        out.weight = lanes.select(r2 * (light_ratio2 + b * b), out.weight);
         let radiance = sky.select(next.radiance, next.vertex.emission_towards(-wi));
         out.radiance = lanes.select(radiance, out.radiance);
-        out.recent = visible & step.hits.valid;
+        // On two sides of an opaque surface the paths share no light: they part here, whichever is the base.
+        let n = next.vertex.bsdf.frame.n;
+        let same_side = (n.dot(-wi) * n.dot(next.vertex.wo)).gt(f32x16::ZERO);
+        out.recent = visible & step.hits.valid & (same_side | next.vertex.bsdf.transmits());
         out.wo = out.recent.select(-wi, out.wo);
         self.count(ShiftOutcome::Reconnected, visible);
         self.count(ShiftOutcome::Occluded, scatters.and_not(visible));
@@ -443,6 +450,19 @@ fn offset_light<A: Accel>(
     (lit.contribution(point), lit.pdf_ratio(point))
 }
 
+/// J ℓ_y / ℓ_x of an NEE event: how much likelier the offset's vertex chooses the point than the base's did.
+fn offset_light_ratio<A: Accel>(
+    tracer: &Tracer<'_, A>,
+    offset: &Offset,
+    light: &DirectLight,
+    evaluated: Mask,
+) -> f32x16 {
+    // Recently connected, it chooses from the base's own vertex.
+    let apart = evaluated.and_not(offset.recent);
+    let own = tracer.scene.lights.pdf_from(&light.point, &Receiver::new(&offset.surface), apart);
+    apart.select(own / light.point.pdf, splat(1.0))
+}
+
 /// Evaluates `f` only where some lane needs it.
 #[inline(always)]
 fn if_any<T: Default>(lanes: Mask, f: impl FnOnce() -> T) -> T {
@@ -450,14 +470,14 @@ fn if_any<T: Default>(lanes: Mask, f: impl FnOnce() -> T) -> T {
 }
 
 /// Evaluates where the base arrives.
-fn arrive<A: Accel>(tracer: &Tracer<'_, A>, walk: &Walk<'_>, step: &Bounce) -> Next {
+fn arrive<A: Accel>(tracer: &Tracer<'_, A>, walk: &Walk<'_>, from: &Surface, step: &Bounce) -> Next {
     let wi: Vec3x = step.sample.wi;
     let lights = &tracer.scene.lights;
     let vertex = Surface::new(tracer.scene, &step.hits, step.active & step.hits.valid, -wi);
     let sky = if lights.has_environment() { step.escaped() } else { Mask::NONE };
     let (environment, environment_pdf) = if_any(sky, || lights.environment_with_pdf(wi));
     let radiance = sky.select(environment, (step.hits.valid & vertex.is_emitter).keep(vertex.emission));
-    let surface_pdf = step.hits.valid.keep(light_pdf(&vertex, wi, step.hits.t));
+    let surface_pdf = light_pdf(tracer.scene, from, wi, &step.hits, step.active);
     let light_pdf = sky.select(environment_pdf, surface_pdf);
     let ratio = (!step.sample.dirac).keep(light_pdf / step.sample.pdf);
     let diffuse = sky | vertex.is_emitter | walk.is_diffuse(&vertex);

@@ -5,7 +5,7 @@ use super::wave::{Region, Scratch};
 use super::{Integrator, Statistics, View};
 use crate::accel::Accel;
 use crate::film::{FilmTile, PixelSample};
-use crate::math::{LANES, Rgb, splat};
+use crate::math::{LANES, Rgb, f32x16, splat};
 use crate::path::Streams;
 use crate::path::queue::Arrival;
 use crate::path::tail;
@@ -26,7 +26,7 @@ fn first_arrival(slots: [u32; LANES], streams: Streams, primary: &Primary) -> Ar
         tau: Rgb::grey(1.0),
         tail: Rgb::ZERO,
         eta_squared: splat(1.0),
-        bsdf_pdf: splat(-1.0),
+        emission_weight: f32x16::ZERO,
     }
 }
 

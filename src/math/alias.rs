@@ -1,10 +1,12 @@
 //! Discrete distributions in constant time: Walker's alias method (Vose 1991).
 
+/// (threshold in 0..=1, outcome above it) of one outcome.
+pub type Bin = (f32, u32);
+
 /// An alias table over n outcomes: one look-up a sample, exact probabilities for queries.
 #[derive(Clone, Debug, Default)]
 pub struct AliasTable {
-    /// (threshold in 0..=1, outcome above it) of each bin.
-    bins: Vec<(f32, u32)>,
+    bins: Vec<Bin>,
     /// Probability of each outcome; sums to 1.
     pdf: Vec<f32>,
 }
@@ -59,21 +61,34 @@ impl AliasTable {
         self.pdf[outcome]
     }
 
+    /// The bins, for those who keep many small tables in one array and draw with [`draw`].
+    pub fn bins(&self) -> &[Bin] {
+        &self.bins
+    }
+
     /// The outcome for `u` in [0, 1), and a fresh uniform number made from the rest of `u`.
     #[inline(always)]
     pub fn sample(&self, u: f32) -> (usize, f32) {
-        let scaled = u * self.bins.len() as f32;
-        let bin = (scaled as usize).min(self.bins.len() - 1);
-        let rest = scaled - bin as f32;
-        let (threshold, alias) = self.bins[bin];
-        const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
-        if rest < threshold {
-            (bin, (rest / threshold).min(BELOW_ONE))
-        } else {
-            (alias as usize, ((rest - threshold) / (1.0 - threshold)).clamp(0.0, BELOW_ONE))
-        }
+        draw(&self.bins, u)
     }
 }
+
+/// [`AliasTable::sample`] for the bins of a table; there must be one.
+#[inline(always)]
+pub fn draw(bins: &[Bin], u: f32) -> (usize, f32) {
+    let scaled = u * bins.len() as f32;
+    let bin = (scaled as usize).min(bins.len() - 1);
+    let rest = scaled - bin as f32;
+    let (threshold, alias) = bins[bin];
+    if rest < threshold {
+        (bin, (rest / threshold).min(BELOW_ONE))
+    } else {
+        (alias as usize, ((rest - threshold) / (1.0 - threshold)).clamp(0.0, BELOW_ONE))
+    }
+}
+
+/// The largest f32 below 1.
+pub const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
 #[cfg(test)]
 mod tests {

@@ -4,7 +4,7 @@ use super::trace::{Segment, SegmentKind, Tracer};
 use super::{Limits, Streams};
 use crate::accel::{Accel, Coherence, Hits, Rays};
 use crate::math::{Compare, Mask, Rgb, Select, Vec3x, f32x16, splat};
-use crate::shade::{BsdfSample, Surface};
+use crate::shade::{BsdfSample, Receiver, ShadeScene, Surface};
 
 /// One step from x_k to x_{k+1}.
 #[derive(Clone, Copy)]
@@ -77,11 +77,11 @@ pub fn absorption(surface: &Surface, wi: Vec3x, hits: &Hits) -> Rgb {
     Rgb::select(hits.valid, inside, Rgb::grey(1.0))
 }
 
-/// The solid-angle pdf ℓ with which light sampling at the previous vertex finds `vertex`, `distance` away in
-/// direction `wi` (towards `vertex`); 0 where `vertex` is not on a sampled light.
+/// The solid-angle pdf ℓ with which light sampling at `from` finds the points `hits`, where a ray from there along
+/// `wi` arrives; 0 where they are not on a sampled light.
+///
+/// With the base's ray and the offset's vertex as `from` it is J ℓ_y: the light point's measure cancels.
 #[inline(always)]
-pub fn light_pdf(vertex: &Surface, wi: Vec3x, distance: f32x16) -> f32x16 {
-    let cos = vertex.ng.dot(wi).abs();
-    let on_light = vertex.light_pdf.gt(f32x16::ZERO) & cos.gt(f32x16::ZERO);
-    on_light.keep(vertex.light_pdf * distance * distance / cos)
+pub fn light_pdf(scene: &ShadeScene, from: &Surface, wi: Vec3x, hits: &Hits, active: Mask) -> f32x16 {
+    scene.lights.hit_pdf(&Receiver::new(from), hits, wi, active)
 }

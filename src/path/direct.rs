@@ -1,14 +1,14 @@
 //! Next-event estimation: one point on a light a vertex.
 //!
-//! The point is chosen without looking at the receiver, so a shifted path evaluates the same point (bug B10 of the
-//! reference implementation cannot arise). With p the pdf of the point in its own measure (m⁻² on an area light) and
-//! g = |cos θ_light| / d² the solid-angle pdf is ℓ = p / g and the estimate f L g / p.
+//! The base chooses the point, and a shifted path evaluates the same one (bug B10 of the reference implementation
+//! cannot arise). With p the pdf of the point in its own measure (m⁻² on an area light) and g = |cos θ_light| / d²
+//! the solid-angle pdf is ℓ = p / g and the estimate f L g / p. The offset's p is its own: J ℓ_y / ℓ_x = p_y / p_x.
 
 use super::Streams;
 use super::trace::{Segment, SegmentKind, Tracer};
 use crate::accel::{Accel, Coherence, Rays};
 use crate::math::{Compare, Mask, Rgb, Vec3x, f32x16, splat};
-use crate::shade::{LightPoint, LightSeen, Surface};
+use crate::shade::{LightPoint, LightSeen, Receiver, Surface};
 
 /// A light point as one vertex sees it, with the BSDF towards it.
 #[derive(Clone, Copy, Default)]
@@ -94,6 +94,7 @@ pub fn shadow<A: Accel>(
 }
 
 /// Draws a light point for the base vertices x_`depth` and settles its visibility.
+#[inline(always)]
 pub fn sample<A: Accel>(
     tracer: &mut Tracer<'_, A>,
     surface: &Surface,
@@ -108,7 +109,8 @@ pub fn sample<A: Accel>(
         return None;
     }
     let [select, u, v, _] = streams.light(depth);
-    let point = tracer.scene.lights.sample(tracer.scene, select, u, v);
+    let from = Receiver::new(surface);
+    let point = tracer.scene.lights.sample(tracer.scene, &from, active, select, u, v);
     let active = active & point.valid;
     let segment = Segment::new(streams, depth, SegmentKind::Light);
     let mut base = look(tracer, surface, &point, active);

@@ -7,7 +7,8 @@ use crate::accel::Hits;
 use crate::math::{LANES, Mask, Pick, Rgb, Vec3x, f32x16};
 
 /// Columns of a path: slot, stream seed, sample index; the hit (instance, triangle, u, v, distance); direction back,
-/// throughput, radiance; throughput and radiance since the tail began; squared relative index; pdf.
+/// throughput, radiance; throughput and radiance since the tail began; squared relative index; weight
+/// of what is emitted.
 const COLUMNS: usize = 25;
 
 /// How sixteen paths arrive at their vertices, and what they have gathered on the way.
@@ -31,9 +32,9 @@ pub struct Arrival {
     pub tail: Rgb,
     /// Squared product of relative indices along the path.
     pub eta_squared: f32x16,
-    /// Solid-angle pdf of the direction they came by; 0 after a Dirac event, negative where the emission of this
-    /// vertex is already accounted for.
-    pub bsdf_pdf: f32x16,
+    /// Weight of what the vertex emits, against light sampling at the vertex before; 0 where that emission is
+    /// already accounted for.
+    pub emission_weight: f32x16,
 }
 
 /// Paths that stand at the same vertex.
@@ -91,7 +92,7 @@ impl Arrival {
             t.y,
             t.z,
             self.eta_squared,
-            self.bsdf_pdf,
+            self.emission_weight,
         ]
     }
 
@@ -109,7 +110,7 @@ impl Arrival {
             tau: vector(17),
             tail: vector(20),
             eta_squared: c[23],
-            bsdf_pdf: c[24],
+            emission_weight: c[24],
         }
     }
 }

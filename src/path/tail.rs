@@ -55,10 +55,9 @@ fn step<A: Accel>(
     let surface = Surface::new(tracer.scene, &packet.hits, active, wo);
 
     // What the vertex emits, unless the head has already counted it.
-    let emits = active & surface.is_emitter & packet.bsdf_pdf.ge(f32x16::ZERO);
+    let emits = active & surface.is_emitter;
     if emits.any() {
-        let weight = emission_weight(packet.bsdf_pdf, light_pdf(&surface, -wo, packet.hits.t));
-        path.gather(emits.keep(surface.emission * weight));
+        path.gather(emits.keep(surface.emission * packet.emission_weight));
     }
     if depth >= limits.max_depth {
         return path.finish(active, slots);
@@ -71,15 +70,17 @@ fn step<A: Accel>(
     let next = bounce(tracer, &surface, path.beta, &mut path.eta_squared, streams, depth, limits, active);
     let factor = next.factor();
     (path.beta, path.tau) = (path.beta * factor, path.tau * factor);
-    path.bsdf_pdf = next.sample.dirac.select(f32x16::ZERO, next.sample.pdf);
+    let bsdf_pdf = next.sample.dirac.select(f32x16::ZERO, next.sample.pdf);
     let escaped = next.escaped();
     let lights = &tracer.scene.lights;
     if escaped.any() && lights.has_environment() {
         let (radiance, pdf) = lights.environment_with_pdf(next.sample.wi);
-        path.gather(escaped.keep(radiance * emission_weight(path.bsdf_pdf, pdf)));
+        path.gather(escaped.keep(radiance * emission_weight(bsdf_pdf, pdf)));
     }
     let goes_on = next.active & next.hits.valid;
     path.finish(active.and_not(goes_on), slots);
+    let found = light_pdf(tracer.scene, &surface, next.sample.wi, &next.hits, goes_on);
+    path.emission_weight = emission_weight(bsdf_pdf, found);
     path.hits = next.hits;
     path.wo = -next.sample.wi;
     queues.push(depth + 1, goes_on, &path);

@@ -195,6 +195,12 @@ impl Bsdf {
         self.has_specular() & self.alpha.same(f32x16::ZERO)
     }
 
+    /// Lanes that let light cross the surface.
+    #[inline(always)]
+    pub fn transmits(&self) -> Mask {
+        self.clear.gt(f32x16::ZERO)
+    }
+
     /// Smallest GGX alpha over the smooth lobes: infinite where there is only Lambert, 0 where there is none.
     #[inline(always)]
     pub fn smooth_alpha(&self) -> f32x16 {

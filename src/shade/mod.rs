@@ -15,7 +15,7 @@ pub mod texture;
 
 pub use bsdf::{Bsdf, BsdfSample, DiracEval, Parameters};
 pub use env::EnvironmentTable;
-pub use lights::{LightPoint, LightSeen, Lights, solid_angle_pdf};
+pub use lights::{LightPoint, LightSeen, Lights, Receiver, solid_angle_pdf};
 pub use mesh_point::alpha;
 pub use surface::Surface;
 

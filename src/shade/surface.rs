@@ -34,8 +34,6 @@ pub struct Surface {
     two_sided: Mask,
     /// On an emissive or unlit surface, whichever side.
     pub is_emitter: Mask,
-    /// Area pdf with which light sampling picks this point, m⁻²; 0 where it never does.
-    pub light_pdf: f32x16,
     /// Base colour.
     pub albedo: Rgb,
     /// Bound on the rounding of `p`, m.
@@ -180,7 +178,8 @@ fn apply_base_textures(
     for lane in lanes.iter() {
         let place = &scene.records.places[hits.instance[lane] as usize];
         let Some(t) = &scene.scene.materials[place.material].base_color_texture else { continue };
-        let uv = if t.uv_set == 0 { Vec2::new(u[lane], v[lane]) } else { mesh_point(scene, hits, lane).uv()[1] };
+        let uv =
+            if t.uv_set == 0 { Vec2::new(u[lane], v[lane]) } else { mesh_point(scene, hits, lane).uv()[1] };
         let texture = &scene.scene.textures[t.texture as usize];
         footprints[lane] = Footprint::new(texture, t.transform.transform_point2(uv));
     }
@@ -193,7 +192,13 @@ fn apply_base_textures(
 }
 
 /// Multiplies what other textures and vertex colours say into the columns of the material.
-fn apply_textures(scene: &ShadeScene, hits: &Hits, lanes: Mask, uv: [f32x16; 2], material: &mut [f32x16; LANES]) {
+fn apply_textures(
+    scene: &ShadeScene,
+    hits: &Hits,
+    lanes: Mask,
+    uv: [f32x16; 2],
+    material: &mut [f32x16; LANES],
+) {
     let [u, v] = uv.map(f32x16::to_array);
     let mut columns = material.map(f32x16::to_array);
     for lane in lanes.iter() {
@@ -251,7 +256,9 @@ impl NormalMap {
             let index = hits.instance[lane] as usize;
             let at = mesh_point(scene, hits, lane);
             let material = &scene.scene.materials[at.mesh.material as usize];
-            let (Some(texture), Some(tangents)) = (&material.normal_texture, &at.mesh.tangents) else { continue };
+            let (Some(texture), Some(tangents)) = (&material.normal_texture, &at.mesh.tangents) else {
+                continue;
+            };
             let tangent: Vec4 = at.interpolate(tangents);
             let to_world = &scene.scene.instances[index].to_world;
             map.tangent.set(lane, to_world.transform_vector3(tangent.truncate()));
@@ -274,10 +281,9 @@ impl NormalMap {
     }
 }
 
-/// Radiance and area pdf of the lanes on emissive or unlit surfaces; `base` is their base colour.
-fn emission(scene: &ShadeScene, hits: &Hits, emitters: Mask, base: Rgb) -> (Rgb, f32x16) {
+/// Radiance of the lanes on emissive or unlit surfaces; `base` is their base colour.
+fn emission(scene: &ShadeScene, hits: &Hits, emitters: Mask, base: Rgb) -> Rgb {
     let mut radiance = Column3::default();
-    let mut pdf = [0.0; LANES];
     for lane in emitters.iter() {
         let at = mesh_point(scene, hits, lane);
         let material = &scene.scene.materials[at.mesh.material as usize];
@@ -288,9 +294,8 @@ fn emission(scene: &ShadeScene, hits: &Hits, emitters: Mask, base: Rgb) -> (Rgb,
         let texture = material.emission_texture.as_ref();
         let texel = texture.map_or(Vec4::ONE, |t| scene.decoder.lookup_ref(scene.scene, t, at.uv()));
         radiance.set(lane, material.emission * texel.truncate());
-        pdf[lane] = scene.lights.triangle_pdf(hits.instance[lane] as usize, hits.primitive[lane]);
     }
-    (radiance.wide(), f32x16::new(pdf))
+    radiance.wide()
 }
 
 impl Surface {
@@ -318,9 +323,9 @@ impl Surface {
         let base = parameters.base;
         let mut bsdf = Bsdf::new(frame, &parameters);
         let is_emitter = g.has(flag::EMITTER);
-        let (mut emitted, mut light_pdf) = (Rgb::ZERO, f32x16::ZERO);
+        let mut emitted = Rgb::ZERO;
         if is_emitter.any() {
-            (emitted, light_pdf) = emission(scene, hits, is_emitter, base);
+            emitted = emission(scene, hits, is_emitter, base);
             bsdf = g.has(flag::UNLIT).select(Bsdf::black(frame), bsdf);
         }
         let two_sided = g.has(flag::TWO_SIDED);
@@ -334,7 +339,6 @@ impl Surface {
             emitted,
             two_sided,
             is_emitter,
-            light_pdf,
             albedo: base,
             offset: g.geometry[OFFSET],
         }
@@ -354,16 +358,4 @@ impl Surface {
     }
 }
 
-crate::lanewise!(Surface {
-    p,
-    ng,
-    wo,
-    bsdf,
-    emission,
-    emitted,
-    two_sided,
-    is_emitter,
-    light_pdf,
-    albedo,
-    offset
-});
+crate::lanewise!(Surface { p, ng, wo, bsdf, emission, emitted, two_sided, is_emitter, albedo, offset });

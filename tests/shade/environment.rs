@@ -2,7 +2,8 @@
 
 use crate::Random;
 use crate::chi_square::assert_follows;
-use gdpt::math::{LANES, Vec3x};
+use crate::scenes::{receiver, sample};
+use gdpt::math::{LANES, Mask, Vec3x};
 use gdpt::scene::{Environment, Scene};
 use gdpt::shade::ShadeScene;
 use glam::{DVec3, Quat, Vec3};
@@ -73,7 +74,7 @@ fn directions_follow_the_pdf_and_agree_with_queries() {
         let mut observed = vec![0.0; ROWS * COLUMNS];
         let mut differing = 0;
         for _ in 0..SAMPLES / LANES {
-            let point = prepared.lights.sample(&prepared, random.wide(), random.wide(), random.wide());
+            let point = sample(&prepared, &receiver(Vec3::ZERO, Vec3::Y), &mut random);
             assert!(point.is_env.all() && point.valid.all());
             let query = prepared.lights.environment_with_pdf(point.p).1;
             for lane in 0..LANES {
@@ -110,7 +111,7 @@ fn importance_sampling_integrates_what_quadrature_does() {
     let mut random = Random::new(41);
     let (mut sum, mut squares) = (0.0, 0.0);
     for _ in 0..SAMPLES / LANES {
-        let point = prepared.lights.sample(&prepared, random.wide(), random.wide(), random.wide());
+        let point = sample(&prepared, &receiver(Vec3::ZERO, Vec3::Y), &mut random);
         let seen = prepared.lights.seen_from(&prepared, &point, Vec3x::ZERO);
         for lane in 0..LANES {
             let value = f64::from(seen.radiance.lane(lane).y / point.pdf.as_array()[lane]);
@@ -152,5 +153,7 @@ fn a_black_environment_is_none() {
     let (d, u) = (random.directions(), random.wide());
     assert!(prepared.lights.environment(d).is_zero().all());
     assert_eq!(prepared.lights.environment_with_pdf(d).1.to_array(), [0.0; LANES]);
-    assert!(prepared.lights.sample(&prepared, u, u, u).valid.none());
+    assert!(
+        prepared.lights.sample(&prepared, &receiver(Vec3::ZERO, Vec3::Y), Mask::ALL, u, u, u).valid.none()
+    );
 }

@@ -2,19 +2,15 @@
 
 use crate::Random;
 use crate::chi_square::assert_follows;
-use crate::scenes::{emitter, hit, matte, one_square, place, reference, square, texture};
+use crate::scenes::{
+    area_pdf, emitter, hit, matte, one_square, place, receiver, reference, sample, square, texture,
+};
 use gdpt::math::{LANES, Mask, Vec3x, f32x16, splat};
 use gdpt::scene::{AlphaMode, Environment, Material, PunctualKind, PunctualLight, Scene};
 use gdpt::shade::{ShadeScene, Surface, solid_angle_pdf};
 use glam::{Affine3A, DVec3, Quat, Vec3, Vec4};
 
 const SAMPLES: usize = 1_000_000;
-
-/// Area pdf of a triangle of instance `instance`, as a hit on it reports it.
-fn query(scene: &ShadeScene, instance: u32, primitive: u32) -> f64 {
-    let s = Surface::new(scene, &hit(instance, primitive, 0.2, 0.3), Mask::ALL, Vec3x::splat(Vec3::Z));
-    f64::from(s.light_pdf.as_array()[0])
-}
 
 /// A light of some kind, shining down from 2 m.
 fn punctual(kind: PunctualKind) -> PunctualLight {
@@ -50,22 +46,24 @@ fn many() -> Scene {
 fn selection_probabilities_sum_to_one_and_frequencies_follow_them() {
     let scene = many();
     let prepared = ShadeScene::new(&scene);
+    let from = receiver(Vec3::new(0.2, 0.1, 9.0), Vec3::NEG_Z);
     // Outcomes: a triangle each (two a square), punctual lights by position or direction, the environment.
     let mut expected = vec![0.0; 12];
     for instance in 0..4_u32 {
         for primitive in 0..2 {
             let area = 0.5 * (1.0 + f64::from(instance));
-            expected[(2 * instance + primitive) as usize] = query(&prepared, instance, primitive) * area;
+            expected[(2 * instance + primitive) as usize] =
+                area_pdf(&prepared, &from, instance, primitive) * area;
         }
     }
     assert_eq!((expected[6], expected[7]), (0.0, 0.0), "a black triangle is selected");
     let mut observed = vec![0.0; 12];
     let mut random = Random::new(53);
     for _ in 0..SAMPLES / LANES {
-        let point = prepared.lights.sample(&prepared, random.wide(), random.wide(), random.wide());
+        let point = sample(&prepared, &from, &mut random);
         let kinds = [point.is_area, point.is_env, point.is_dirac].map(Mask::bits);
         assert_eq!((kinds[0] ^ kinds[1] ^ kinds[2], kinds[0] & kinds[1] & kinds[2]), (0xffff, 0));
-        let seen = prepared.lights.seen_from(&prepared, &point, Vec3x::splat(Vec3::new(0.2, 0.1, 9.0)));
+        let seen = prepared.lights.seen_from(&prepared, &point, from.p);
         for lane in 0..LANES {
             let p = point.p.lane(lane);
             let pdf = f64::from(point.pdf.as_array()[lane]);
@@ -138,7 +136,7 @@ fn area_lights_give_the_irradiance_of_their_polygon() {
     let mut random = Random::new(61);
     let (mut sum, mut squares) = (0.0, 0.0);
     for _ in 0..4 * SAMPLES / LANES {
-        let point = prepared.lights.sample(&prepared, random.wide(), random.wide(), random.wide());
+        let point = sample(&prepared, &receiver(p, n), &mut random);
         let seen = prepared.lights.seen_from(&prepared, &point, Vec3x::splat(p));
         for lane in 0..LANES {
             let wi = seen.wi.lane(lane);
@@ -175,7 +173,8 @@ fn solid_angle_pdfs_integrate_to_one_over_the_light() {
         let y = ((i / STEPS) as f64 + 0.5) / STEPS as f64;
         let to = p - DVec3::new(x, y, 0.0);
         let (d2, cos) = (to.length_squared(), to.z / to.length());
-        let pdf = solid_angle_pdf(splat(query(&prepared, 0, 0) as f32), splat(d2 as f32), splat(cos as f32));
+        let density = area_pdf(&prepared, &receiver(p.as_vec3(), Vec3::NEG_Z), 0, 0) as f32;
+        let pdf = solid_angle_pdf(splat(density), splat(d2 as f32), splat(cos as f32));
         integral += f64::from(pdf.as_array()[0]) * cos / d2 / (STEPS * STEPS) as f64;
     }
     assert!((integral - 1.0).abs() < 1e-3, "{integral}");
@@ -190,12 +189,13 @@ fn one_sided_lights_are_dark_behind() {
         let scene = one_square(material, Affine3A::from_scale(flip));
         let prepared = ShadeScene::new(&scene);
         let u = splat(0.4);
-        let point = prepared.lights.sample(&prepared, u, u, u);
+        let from = receiver(Vec3::new(0.3, 0.3, 1.0), Vec3::NEG_Z);
+        let point = prepared.lights.sample(&prepared, &from, Mask::ALL, u, u, u);
         let seen =
             |z: f32| prepared.lights.seen_from(&prepared, &point, Vec3x::splat(Vec3::new(0.3, 0.3, z)));
         assert_eq!(seen(1.0).radiance.lane(0), Vec3::ONE);
         assert_eq!(seen(-1.0).radiance.lane(0), Vec3::splat(f32::from(u8::from(two_sided))));
-        // Geometry does not depend on the side: the pdf of light sampling does not look at the receiver.
+        // Geometry does not depend on the side.
         assert_eq!(seen(1.0).geometry.to_array(), seen(-1.0).geometry.to_array());
         assert!(seen(-1.0).target.lane(0).z < 0.0 && seen(1.0).target.lane(0).z > 0.0);
         // On the light itself: nothing, and no NaN.
@@ -216,9 +216,10 @@ fn textured_and_covered_emission_is_the_one_a_ray_meets() {
     scene.textures.push(texture(2, &[[255, 188, 0, 255], [0, 10, 255, 255]], true, true));
     let prepared = ShadeScene::new(&scene);
     let mut random = Random::new(71);
+    let from = receiver(Vec3::new(0.5, 0.5, 1.0), Vec3::NEG_Z);
     for _ in 0..200 {
-        let point = prepared.lights.sample(&prepared, random.wide(), random.wide(), random.wide());
-        let seen = prepared.lights.seen_from(&prepared, &point, Vec3x::splat(Vec3::new(0.5, 0.5, 1.0)));
+        let point = sample(&prepared, &from, &mut random);
+        let seen = prepared.lights.seen_from(&prepared, &point, from.p);
         for lane in 0..LANES {
             // Triangle 0 has corners (0,0), (1,0), (1,1): u = x − y, v = y; triangle 1 (0,0), (1,1), (0,1).
             let p = point.p.lane(lane);
@@ -243,7 +244,7 @@ fn emission_behind_a_black_texture_is_not_sampled() {
     scene.textures.push(texture(1, &[[0, 0, 0, 255]], true, true));
     let prepared = ShadeScene::new(&scene);
     assert!(prepared.lights.is_empty());
-    assert_eq!(query(&prepared, 0, 0), 0.0);
+    assert_eq!(area_pdf(&prepared, &receiver(Vec3::Z, Vec3::NEG_Z), 0, 0), 0.0);
     assert!(ShadeScene::new(&one_square(matte(), Affine3A::IDENTITY)).lights.is_empty());
 }
 
@@ -264,7 +265,8 @@ fn punctual_lights_fall_off_as_the_extension_says() {
         let scene = Scene { lights: vec![punctual(kind)], ..Scene::default() };
         let prepared = ShadeScene::new(&scene);
         let u = splat(0.3);
-        let point = prepared.lights.sample(&prepared, u, u, u);
+        let from = receiver(Vec3::ZERO, Vec3::Y);
+        let point = prepared.lights.sample(&prepared, &from, Mask::ALL, u, u, u);
         assert!(point.is_dirac.all() && point.valid.all());
         assert_eq!(point.pdf.as_array()[0], 1.0);
         let away = Vec3::new((1.0 - c * c).sqrt(), -c, 0.0);

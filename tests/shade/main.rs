@@ -6,6 +6,7 @@ mod bsdf;
 mod bsdf_properties;
 mod chi_square;
 mod environment;
+mod light_tree;
 mod lights;
 mod scenes;
 mod surface;

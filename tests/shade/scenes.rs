@@ -1,8 +1,10 @@
 //! Small scenes in code.
 
+use crate::Random;
 use gdpt::accel::Hits;
-use gdpt::math::{LANES, Mask, f32x16, splat};
+use gdpt::math::{LANES, Mask, Vec3x, f32x16, splat};
 use gdpt::scene::{Instance, Material, Mesh, Scene, Texture, TextureRef, Wrap};
+use gdpt::shade::{LightPoint, Receiver, ShadeScene};
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec3A, Vec4};
 use std::sync::Arc;
 
@@ -43,6 +45,16 @@ pub fn one_square(material: Material, to_world: Affine3A) -> Scene {
     scene
 }
 
+/// The same receiver in all lanes; light counts that arrives on the side of `n`.
+pub fn receiver(p: Vec3, n: Vec3) -> Receiver {
+    Receiver { p: Vec3x::splat(p), n: Vec3x::splat(n), both_sides: Mask::NONE }
+}
+
+/// Sixteen light points for `from`.
+pub fn sample(scene: &ShadeScene, from: &Receiver, random: &mut Random) -> LightPoint {
+    scene.lights.sample(scene, from, Mask::ALL, random.wide(), random.wide(), random.wide())
+}
+
 /// The same hit in all lanes.
 pub fn hit(instance: u32, primitive: u32, u: f32, v: f32) -> Hits {
     hits(instance, primitive, splat(u), splat(v))
@@ -73,4 +85,12 @@ pub fn reference() -> TextureRef {
 /// A material that emits.
 pub fn emitter(radiance: Vec3) -> Material {
     Material { emission: radiance, base_color: Vec4::new(0.0, 0.0, 0.0, 1.0), ..matte() }
+}
+
+/// Area pdf for `from` of a triangle of instance `instance` that lies in a plane of constant z: a ray of length 1
+/// that meets it at right angles.
+pub fn area_pdf(scene: &ShadeScene, from: &Receiver, instance: u32, primitive: u32) -> f64 {
+    let hits = hit(instance, primitive, 0.2, 0.3);
+    let pdf = scene.lights.hit_pdf(from, &hits, Vec3x::splat(Vec3::Z), Mask::ALL);
+    f64::from(pdf.as_array()[0])
 }

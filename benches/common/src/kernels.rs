@@ -16,7 +16,7 @@ use gdpt::math::{Mask, Vec3x, lanes};
 use gdpt::path::shift::{PairWeights, half_vector, reconnect};
 use gdpt::reconstruct::{Input, Method, reconstruct};
 use gdpt::scene::{Material, Scene, builtin};
-use gdpt::shade::{ShadeScene, Surface};
+use gdpt::shade::{Receiver, ShadeScene, Surface};
 use glam::Vec3;
 use rayon::ThreadPoolBuilder;
 use std::hint::black_box;
@@ -137,8 +137,9 @@ fn light(scene: Scene) -> Facts {
     let prepared = ShadeScene::new(&scene);
     let [u, v, w] = [0.618, 0.755, 0.57].map(uniform);
     let p = Vec3x::splat(Vec3::new(3.0, 0.0, 4.0));
+    let from = Receiver { p, n: Vec3x::splat(Vec3::Y), both_sides: Mask::NONE };
     repeated(|| {
-        let point = prepared.lights.sample(&prepared, black_box(u), v, w);
+        let point = prepared.lights.sample(&prepared, &from, Mask::ALL, black_box(u), v, w);
         prepared.lights.seen_from(&prepared, &point, p)
     })
 }

@@ -1,33 +1,77 @@
 //! Lights: emissive triangles, point, spot and directional lights, the environment.
 //!
-//! One alias table selects among them: triangles and punctual lights by power; the environment with probability 1/2
-//! beside others. A light point is chosen without looking at the receiver, so that the paths of a gradient share it;
-//! `seen_from` then says what a receiver gets from it. Estimator: radiance · geometry · f / pdf. As a solid-angle
-//! density at the receiver, pdf / geometry.
+//! An alias table selects among the environment (probability 1/2 beside others), each directional light and all
+//! lights that have a place (by power); a light tree then selects one of these by what it gives to the receiver
+//! (`tree`, `build`). So the pdf of a light point belongs to the receiver it was drawn for; another receiver that uses
+//! the same point, as the paths of a gradient do, asks for its own with [`Lights::pdf_from`]. `seen_from` says what
+//! a receiver gets from a point. Estimator: radiance · geometry · f / pdf. As a solid-angle density at the receiver,
+//! pdf / geometry.
 
+mod build;
+mod collect;
+mod tree;
+
+use super::ShadeScene;
 use super::env::EnvironmentTable;
 use super::mesh_point::MeshPoint;
-use super::texture::Decoder;
-use super::{ShadeScene, corners, offset_bound};
+use super::surface::Surface;
+use crate::accel::Hits;
 use crate::math::alias::AliasTable;
 use crate::math::warp::square_to_triangle;
 use crate::math::{Compare, LANES, Mask, Rgb, Vec3x, f32x16, splat};
-use crate::scene::{PunctualKind, PunctualLight, Scene};
+use crate::scene::{PunctualKind, PunctualLight};
 use glam::Vec3;
-use std::f32::consts::PI;
+use tree::LightTree;
 
-/// Everything that emits, and the table that selects from it: triangles first, then punctual lights, then the
-/// environment.
+/// Everything that emits, and how one is selected.
 #[derive(Clone, Debug, Default)]
 pub struct Lights {
+    /// The first lights of the tree.
     triangles: Vec<LightTriangle>,
-    punctual: Vec<PunctualLight>,
+    /// The other lights of the tree: points and spots.
+    placed: Vec<PunctualLight>,
+    directional: Vec<PunctualLight>,
     environment: Option<EnvironmentTable>,
+    tree: LightTree,
+    /// The tree, the directional lights, the environment; empty where nothing emits.
     table: AliasTable,
-    /// First entry of each instance in `area_pdf`; `None` where its material does not emit.
+    /// First entry of each instance in `of_triangle`; `None` where its material does not emit.
     first: Vec<Option<u32>>,
-    /// Area pdf of each triangle of the emissive instances, m⁻².
-    area_pdf: Vec<f32>,
+    /// The light of each triangle of the emissive instances, or [`NO_LIGHT`].
+    of_triangle: Vec<u32>,
+}
+
+/// The outcome of `Lights::table` that stands for all lights of the tree.
+const TREE: usize = 0;
+
+/// A triangle that is not sampled.
+const NO_LIGHT: u32 = u32::MAX;
+
+/// Sixteen points that receive light.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// Position.
+    pub p: Vec3x,
+    /// Unit shading normal; light counts that arrives on its side.
+    pub n: Vec3x,
+    /// Light counts from both sides.
+    pub both_sides: Mask,
+}
+
+impl Receiver {
+    /// The vertices of paths.
+    #[inline(always)]
+    pub fn new(surface: &Surface) -> Self {
+        let n = surface.bsdf.frame.n;
+        let behind = surface.wo.dot(n).lt(f32x16::ZERO);
+        Self { p: surface.p, n: behind.select(-n, n), both_sides: surface.bsdf.transmits() }
+    }
+
+    /// −1 where light counts from both sides, else 1.
+    #[inline(always)]
+    fn mirror(&self) -> f32x16 {
+        self.both_sides.select(splat(-1.0), splat(1.0))
+    }
 }
 
 /// An emissive triangle in world space.
@@ -41,11 +85,13 @@ struct LightTriangle {
     primitive: u32,
     two_sided: bool,
     offset: f32,
-    /// Where in `Lights::area_pdf`.
-    slot: u32,
+    /// 1 / area, m⁻².
+    inverse_area: f32,
+    /// Radiance, where no texture and no coverage make it vary.
+    constant: Option<Vec3>,
 }
 
-/// Sixteen points on lights, or directions to infinite ones, chosen without looking at a receiver.
+/// Sixteen points on lights, or directions to infinite ones, drawn for sixteen receivers.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LightPoint {
     /// On an emissive triangle.
@@ -60,8 +106,10 @@ pub struct LightPoint {
     pub p: Vec3x,
     /// Unit geometric normal of an area light's front; axis of a spot.
     pub ng: Vec3x,
-    /// m⁻² (area), sr⁻¹ (environment), probability (Dirac): selection included.
+    /// m⁻² (area), sr⁻¹ (environment), probability (Dirac): selection by the receiver it was drawn for included.
     pub pdf: f32x16,
+    /// The light in the tree; unspecified for infinite ones.
+    light: [u32; LANES],
     /// Environment or directional: `p` is a direction.
     is_infinite: Mask,
     /// Emits on both sides.
@@ -99,95 +147,10 @@ pub fn solid_angle_pdf(light_pdf: f32x16, d2: f32x16, cos_light: f32x16) -> f32x
     cos.gt(f32x16::ZERO).select(light_pdf * d2 / cos, f32x16::ZERO)
 }
 
-fn luminance(c: Vec3) -> f64 {
-    f64::from(c.dot(Vec3::new(0.2126, 0.7152, 0.0722)))
-}
-
-/// Power of a punctual light, W; a directional one shines through the disk that covers the scene.
-fn power(light: &PunctualLight, scene_radius: f32) -> f64 {
-    let solid_angle = match light.kind {
-        PunctualKind::Point => 4.0 * PI,
-        PunctualKind::Spot { cos_inner, cos_outer } => 2.0 * PI * (1.0 - 0.5 * (cos_inner + cos_outer)),
-        PunctualKind::Directional => PI * scene_radius * scene_radius,
-    };
-    luminance(light.intensity) * f64::from(solid_angle)
-}
-
 impl Lights {
-    /// Collects the lights of a scene; `handedness` is the sign of each instance's determinant.
-    pub(super) fn new(scene: &Scene, decoder: &Decoder, handedness: &[f32]) -> Self {
-        let mut lights = Self { punctual: scene.lights.clone(), ..Self::default() };
-        let mut weights = lights.collect_triangles(scene, decoder, handedness);
-        let radius = scene.bounds().map_or(1.0, |(lower, upper)| 0.5 * (upper - lower).length());
-        weights.extend(lights.punctual.iter().map(|light| power(light, radius)));
-        lights.environment = scene.environment.as_ref().and_then(EnvironmentTable::new);
-        if lights.environment.is_some() {
-            let others: f64 = weights.iter().filter(|w| w.is_finite()).sum();
-            weights.push(if others > 0.0 { others } else { 1.0 });
-        }
-        lights.table = AliasTable::new(weights).unwrap_or_default();
-        if !lights.table.is_empty() {
-            for (i, triangle) in lights.triangles.iter().enumerate() {
-                let area = 0.5 * triangle.edges[0].cross(triangle.edges[1]).length();
-                lights.area_pdf[triangle.slot as usize] = lights.table.pdf(i) / area;
-            }
-        }
-        lights
-    }
-
-    /// Fills the triangle list; returns the powers.
-    fn collect_triangles(&mut self, scene: &Scene, decoder: &Decoder, handedness: &[f32]) -> Vec<f64> {
-        let mut weights = Vec::new();
-        let mut means = vec![None; scene.textures.len()];
-        for (index, instance) in scene.instances.iter().enumerate() {
-            let mesh = &scene.meshes[instance.mesh as usize];
-            let material = &scene.materials[mesh.material as usize];
-            if !material.is_emissive() {
-                self.first.push(None);
-                continue;
-            }
-            let first = self.area_pdf.len();
-            self.first.push(Some(first as u32));
-            self.area_pdf.resize(first + mesh.triangles.len(), 0.0);
-            let mean = material.emission_texture.as_ref().map_or(Vec3::ONE, |t| {
-                let i = t.texture as usize;
-                *means[i].get_or_insert_with(|| decoder.mean(&scene.textures[i]).truncate())
-            });
-            let sides = if material.double_sided { 2.0 } else { 1.0 };
-            let exitance = luminance(material.emission * mean) * std::f64::consts::PI * sides;
-            for (primitive, &triangle) in mesh.triangles.iter().enumerate() {
-                let corners = corners(instance, &mesh.positions, triangle);
-                let edges = [corners[1] - corners[0], corners[2] - corners[0]];
-                let cross = edges[0].cross(edges[1]) * handedness[index];
-                let power = exitance * 0.5 * f64::from(cross.length());
-                if !(power > 0.0 && power.is_finite()) {
-                    continue;
-                }
-                weights.push(power);
-                self.triangles.push(LightTriangle {
-                    corner: corners[0],
-                    edges,
-                    normal: cross.normalize_or_zero(),
-                    instance: index as u32,
-                    primitive: primitive as u32,
-                    two_sided: material.double_sided,
-                    offset: offset_bound(corners),
-                    slot: (first + primitive) as u32,
-                });
-            }
-        }
-        weights
-    }
-
     /// Whether nothing can be sampled.
     pub fn is_empty(&self) -> bool {
         self.table.is_empty()
-    }
-
-    /// Area pdf of a triangle of an instance, m⁻²; 0 where it is not sampled.
-    #[inline(always)]
-    pub(super) fn triangle_pdf(&self, instance: usize, primitive: u32) -> f32 {
-        self.first[instance].map_or(0.0, |first| self.area_pdf[(first + primitive) as usize])
     }
 
     /// Probability that the environment is selected.
@@ -196,39 +159,110 @@ impl Lights {
         if self.environment.is_some() { self.table.pdf(self.table.len() - 1) } else { 0.0 }
     }
 
-    /// Selects a light by `u_select` and a point on it by (u, v), all in [0, 1).
-    pub fn sample(&self, s: &ShadeScene, u_select: f32x16, u: f32x16, v: f32x16) -> LightPoint {
+    /// Selects a light for each `active` receiver by `u_select` and a point on it by (u, v), all in [0, 1).
+    pub fn sample(
+        &self,
+        s: &ShadeScene,
+        from: &Receiver,
+        active: Mask,
+        u_select: f32x16,
+        u: f32x16,
+        v: f32x16,
+    ) -> LightPoint {
         let mut point = LightPoint::default();
         if self.is_empty() {
             return point;
         }
-        let select = u_select.as_array();
+        let (mut outcome, mut rest) = ([TREE; LANES], u_select);
+        let mut in_tree = active;
+        if self.table.len() > 1 {
+            let mut u = rest.to_array();
+            for lane in active.iter() {
+                (outcome[lane], u[lane]) = self.table.sample(u[lane]);
+            }
+            rest = f32x16::new(u);
+            in_tree = active & Mask::from_fn(|lane| outcome[lane] == TREE);
+        }
+        let (light, selection) = self.tree.select(from, rest, in_tree);
+        point.light = light;
+
         let (b1, b2) = square_to_triangle(u, v);
         let (b1, b2) = (b1.to_array(), b2.to_array());
         let mut gather = Gather::default();
-        for lane in 0..LANES {
-            let (light, _) = self.table.sample(select[lane]);
-            let probability = self.table.pdf(light);
-            if let Some(triangle) = self.triangles.get(light) {
+        for lane in in_tree.iter() {
+            if let Some(triangle) = self.triangles.get(light[lane] as usize) {
                 gather.triangle(s, triangle, b1[lane], b2[lane], lane);
-                gather.pdf[lane] = self.area_pdf[triangle.slot as usize];
-            } else if let Some(light) = self.punctual.get(light - self.triangles.len()) {
-                gather.punctual(light, lane);
-                gather.pdf[lane] = probability;
             } else {
-                gather.env |= 1 << lane;
-                gather.pdf[lane] = probability;
+                gather.punctual(&self.placed[light[lane] as usize - self.triangles.len()], lane);
+                gather.density[lane] = 1.0;
+            }
+        }
+        for lane in active.and_not(in_tree).iter() {
+            gather.density[lane] = self.table.pdf(outcome[lane]);
+            match self.directional.get(outcome[lane] - TREE - 1) {
+                Some(light) => gather.punctual(light, lane),
+                None => gather.env |= 1 << lane,
             }
         }
         gather.finish(&mut point);
+        let density = f32x16::new(gather.density);
+        point.pdf = in_tree.select(density * (selection * splat(self.table.pdf(TREE))), density);
         if let Some(environment) = self.environment.as_ref().filter(|_| point.is_env.any()) {
             let (direction, pdf, radiance) = environment.sample(u, v);
             point.p = point.is_env.select(direction, point.p);
             point.pdf = point.is_env.select(point.pdf * pdf, point.pdf);
             point.emission = point.is_env.select(radiance, point.emission);
         }
-        point.valid = point.pdf.gt(f32x16::ZERO);
+        point.valid = active & point.pdf.gt(f32x16::ZERO);
         point
+    }
+
+    /// The pdf `point` would have had if it had been drawn for `from`, in the measure of `point.pdf`; asked for the
+    /// `active` lanes.
+    #[inline(always)]
+    pub fn pdf_from(&self, point: &LightPoint, from: &Receiver, active: Mask) -> f32x16 {
+        let asked = (active & point.valid).and_not(point.is_infinite);
+        if !self.tree.looks_at_receiver() || asked.none() {
+            return point.pdf;
+        }
+        let mut density = [1.0; LANES];
+        for lane in (asked & point.is_area).iter() {
+            density[lane] = self.triangles[point.light[lane] as usize].inverse_area;
+        }
+        let selection = self.tree.probability(from, &point.light, asked) * splat(self.table.pdf(TREE));
+        asked.select(f32x16::new(density) * selection, point.pdf)
+    }
+
+    /// Solid-angle pdf, sr⁻¹, with which light sampling for `from` finds the points `hits` in direction `wi`; 0 where
+    /// they are not on a sampled light. If distance and direction are those of another vertex, the density is in
+    /// that vertex's solid angle.
+    #[inline(always)]
+    pub fn hit_pdf(&self, from: &Receiver, hits: &Hits, wi: Vec3x, active: Mask) -> f32x16 {
+        let mut on_light = 0;
+        for lane in (active & hits.valid).iter() {
+            on_light |= u16::from(self.first[hits.instance[lane] as usize].is_some()) << lane;
+        }
+        if on_light == 0 { f32x16::ZERO } else { self.emitter_pdf(from, hits, wi, Mask::from_bits(on_light)) }
+    }
+
+    /// [`Lights::hit_pdf`] for `active` lanes that are on emissive instances.
+    fn emitter_pdf(&self, from: &Receiver, hits: &Hits, wi: Vec3x, active: Mask) -> f32x16 {
+        let mut on_light = 0;
+        let mut light = [0; LANES];
+        for lane in active.iter() {
+            let first = self.first[hits.instance[lane] as usize].unwrap_or(0);
+            light[lane] = self.of_triangle[(first + hits.primitive[lane]) as usize];
+            on_light |= u16::from(light[lane] != NO_LIGHT) << lane;
+        }
+        let on_light = Mask::from_bits(on_light);
+        let (mut inverse_area, mut normal) = ([0.0; LANES], [Vec3::ZERO; LANES]);
+        for lane in on_light.iter() {
+            let triangle = &self.triangles[light[lane] as usize];
+            (inverse_area[lane], normal[lane]) = (triangle.inverse_area, triangle.normal);
+        }
+        let selection = self.tree.probability(from, &light, on_light) * splat(self.table.pdf(TREE));
+        let cos = wi.dot(Vec3x::lanes(|lane| normal[lane]));
+        on_light.keep(solid_angle_pdf(selection * f32x16::new(inverse_area), hits.t * hits.t, cos))
     }
 
     /// What the receivers at `p` get from `point`; black where it is not valid.
@@ -282,7 +316,7 @@ struct Gather {
     p: [Vec3; LANES],
     ng: [Vec3; LANES],
     emission: [Vec3; LANES],
-    pdf: [f32; LANES],
+    density: [f32; LANES],
     spot_scale: [f32; LANES],
     spot_shift: [f32; LANES],
     offset: [f32; LANES],
@@ -295,13 +329,16 @@ struct Gather {
 
 impl Gather {
     fn triangle(&mut self, s: &ShadeScene, t: &LightTriangle, u: f32, v: f32, lane: usize) {
-        let instance = &s.scene.instances[t.instance as usize];
-        let mesh = &s.scene.meshes[instance.mesh as usize];
-        let (emission, coverage) = s.decoder.emission(s.scene, &MeshPoint::new(mesh, t.primitive, u, v));
+        self.emission[lane] = t.constant.unwrap_or_else(|| {
+            let instance = &s.scene.instances[t.instance as usize];
+            let mesh = &s.scene.meshes[instance.mesh as usize];
+            let (emission, coverage) = s.decoder.emission(s.scene, &MeshPoint::new(mesh, t.primitive, u, v));
+            emission * coverage
+        });
         self.p[lane] = t.corner + t.edges[0] * u + t.edges[1] * v;
         self.ng[lane] = t.normal;
-        self.emission[lane] = emission * coverage;
         self.offset[lane] = t.offset;
+        self.density[lane] = t.inverse_area;
         self.area |= 1 << lane;
         self.two_sided |= u16::from(t.two_sided) << lane;
     }
@@ -335,7 +372,6 @@ impl Gather {
         point.p = Vec3x::lanes(|i| self.p[i]);
         point.ng = Vec3x::lanes(|i| self.ng[i]);
         point.emission = Vec3x::lanes(|i| self.emission[i]);
-        point.pdf = f32x16::new(self.pdf);
         point.spot_scale = f32x16::new(self.spot_scale);
         point.spot_shift = f32x16::new(self.spot_shift);
         point.offset = f32x16::new(self.offset);
