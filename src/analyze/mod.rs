@@ -1,3 +1,4 @@
 //! What images and buffers say about error.
 
+pub mod flip;
 pub mod metrics;
