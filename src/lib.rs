@@ -9,6 +9,7 @@
 pub mod accel;
 pub mod analyze;
 pub mod cli;
+pub mod denoise;
 pub mod error;
 pub mod film;
 pub mod integrate;

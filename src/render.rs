@@ -12,12 +12,13 @@ use self::prepare::{check_memory, load};
 
 use crate::accel::embree::flush_denormals;
 use crate::accel::{Accel, EmbreeAccel, ObvhsAccel};
+use crate::denoise;
 use crate::error::{Error, Result};
 use crate::film::{Film, Half, Plane};
 use crate::integrate::{self, Statistics};
 use crate::reconstruct::{Input, Method, reconstruct};
 use crate::scene::{Camera, LoadReport, Scene};
-use crate::store::{Window, atomic, exr, layers, png};
+use crate::store::{Document, Window, atomic, exr, layers, png};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -85,7 +86,7 @@ pub struct Report {
 /// Renders `job`. When `cancel` becomes true the run ends with [`Error::Interrupted`] and writes nothing; its
 /// signal number is for the caller to fill in.
 pub fn run(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Report> {
-    for output in &job.outputs {
+    for output in job.outputs.iter().chain(&job.denoised) {
         atomic::probe(&output.path, &job.inputs())?;
     }
     check_memory(job)?;
@@ -135,7 +136,7 @@ pub fn run(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Repo
 }
 
 /// Workers that flush denormals to zero: they are slow, and darker than any image.
-fn pool(threads: usize) -> Result<ThreadPool> {
+pub(crate) fn pool(threads: usize) -> Result<ThreadPool> {
     ThreadPoolBuilder::new()
         .num_threads(threads)
         .start_handler(|_| flush_denormals())
@@ -258,21 +259,36 @@ fn error_estimate(film: &Film) -> Option<f64> {
 
 fn write(job: &Job, film: &Film, camera: &Camera, solved: &Solved) -> Result<()> {
     for output in &job.outputs {
-        match output.format {
-            Format::Png => png::write(&output.path, &solved.image, job.exposure, job.tone_map)?,
-            Format::Exr => {
-                let mut document =
-                    layers::document(film, &solved.image, &job.layers, job.buffers, !job.background);
-                let settings = &job.settings;
-                document.window = settings
-                    .crop
-                    .map(|[x0, y0, ..]| Window { full: [settings.width, settings.height], origin: [x0, y0] });
-                metadata::set_camera(&mut document, camera, settings.width, settings.height);
-                metadata::set_job(&mut document, job)?;
-                metadata::set_solve(&mut document, job.method, job.alpha, solved.residual);
-                exr::write(&output.path, &document)?;
-            }
-        }
+        write_image(job, film, camera, output, &solved.image, |document| {
+            metadata::set_solve(document, job.method, job.alpha, solved.residual);
+        })?;
+    }
+    if let Some(output) = &job.denoised {
+        let image = denoise::film(film)?;
+        write_image(job, film, camera, output, &image, metadata::set_denoised)?;
     }
     Ok(())
+}
+
+/// Writes one image; `set_origin` says in its metadata how it was found.
+fn write_image(
+    job: &Job,
+    film: &Film,
+    camera: &Camera,
+    output: &Output,
+    image: &Plane,
+    set_origin: impl FnOnce(&mut Document),
+) -> Result<()> {
+    if output.format == Format::Png {
+        return png::write(&output.path, image, job.exposure, job.tone_map);
+    }
+    let mut document = layers::document(film, image, &job.layers, job.buffers, !job.background);
+    let settings = &job.settings;
+    document.window = settings
+        .crop
+        .map(|[x0, y0, ..]| Window { full: [settings.width, settings.height], origin: [x0, y0] });
+    metadata::set_camera(&mut document, camera, settings.width, settings.height);
+    metadata::set_job(&mut document, job)?;
+    set_origin(&mut document);
+    exr::write(&output.path, &document)
 }

@@ -1,6 +1,7 @@
 //! The arguments of `gdpt render` as they are typed, and how they become a [`Job`].
 
 use super::progress;
+use crate::denoise;
 use crate::error::{Error, Result};
 use crate::integrate::{Filter, Kind, Settings};
 use crate::reconstruct::Method;
@@ -123,6 +124,10 @@ pub struct RenderFlags {
     /// File to write, .exr or .png; may be given several times
     #[arg(short, long, value_name = "OUT", required = true)]
     output: Vec<PathBuf>,
+    /// Writes the path-traced image, denoised by Open Image Denoise, to this .exr or .png; needs a build with
+    /// --features denoise
+    #[arg(long, value_name = "OUT")]
+    denoise: Option<PathBuf>,
     /// How light is transported
     #[arg(long, value_name = "METHOD", default_value = "gpt")]
     integrator: IntegratorFlag,
@@ -316,6 +321,7 @@ impl RenderFlags {
     /// The job, after the checks that need several arguments.
     pub fn job(&self) -> Result<Job> {
         let outputs = outputs(&self.output)?;
+        let denoised = self.denoised(&outputs)?;
         let has_exr = outputs.iter().any(|o| o.format == Format::Exr);
         if self.buffers && !has_exr {
             return Err(usage("--buffers needs an .exr among the outputs".into()));
@@ -350,7 +356,9 @@ impl RenderFlags {
             },
             shift_threshold: self.shift_threshold,
             pair_mis: self.pair_mis == Switch::On,
-            features: layers.iter().any(|l| l.needs_features()) || self.background == Switch::Off,
+            features: layers.iter().any(|l| l.needs_features())
+                || self.background == Switch::Off
+                || denoised.is_some(),
         };
         let cpus = || std::thread::available_parallelism().map_or(1, |n| n.get());
         Ok(Job {
@@ -377,10 +385,23 @@ impl RenderFlags {
             layers,
             buffers: self.buffers,
             outputs,
+            denoised,
             exposure,
             tone_map,
             strict: self.strict,
         })
+    }
+
+    /// Where the denoised image goes.
+    fn denoised(&self, others: &[Output]) -> Result<Option<Output>> {
+        let Some(path) = &self.denoise else { return Ok(None) };
+        if !denoise::AVAILABLE {
+            return Err(denoise::unavailable());
+        }
+        if others.iter().any(|o| o.path == *path) {
+            return Err(usage(format!("{}: given twice as output", path.display())));
+        }
+        Ok(outputs(std::slice::from_ref(path))?.pop())
     }
 
     fn method(&self) -> Result<(Kind, Method)> {

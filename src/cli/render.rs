@@ -13,7 +13,7 @@ use std::fmt::Write;
 pub fn run(flags: RenderFlags) -> Result<()> {
     let job = flags.job()?;
     if let Some(path) = &flags.stats_json {
-        let outputs = job.outputs.iter().map(|o| o.path.as_path());
+        let outputs = job.outputs.iter().chain(&job.denoised).map(|o| o.path.as_path());
         atomic::probe(path, &job.inputs().into_iter().chain(outputs).collect::<Vec<_>>())?;
     }
     let signals = Signals::install()?;
@@ -75,7 +75,7 @@ fn summary(job: &Job, report: &Report, verbose: bool) -> String {
             row("shifts", format!("{count:>14} {outcome}"));
         }
     }
-    for output in &job.outputs {
+    for output in job.outputs.iter().chain(&job.denoised) {
         row("wrote", output.path.display().to_string());
     }
     text

@@ -131,6 +131,8 @@ pub struct Job {
     pub buffers: bool,
     /// What is written.
     pub outputs: Vec<Output>,
+    /// Where the path-traced image goes, denoised.
+    pub denoised: Option<Output>,
     /// Stops, for PNG.
     pub exposure: f32,
     /// For PNG.

@@ -125,6 +125,12 @@ pub(super) fn set_solve(document: &mut Document, method: Method, alpha: f32, res
     }
 }
 
+/// Adds that the image is the sampled one, denoised.
+pub(super) fn set_denoised(document: &mut Document) {
+    set_solve(document, Method::None, 0.0, None);
+    set(document, "denoiser", "oidn".into());
+}
+
 /// Adds the camera's matrices, for a film of `width`×`height` (the whole picture).
 pub(super) fn set_camera(document: &mut Document, camera: &Camera, width: u32, height: u32) {
     // Camera space of the files: y up, z forward; ours looks along −z.
