@@ -11,10 +11,10 @@ demo:
 	mkdir -p out
 	target/release/gdpt render builtin:cornell-box -o out/cornell-box.exr -o out/cornell-box.png
 
-# Installs what is missing and runs every test.
+# Installs what is missing and runs every test; where OIDN_DIR is set, those of the denoiser too.
 test:
-	./setup
-	cargo test --release --workspace
+	./setup --browser
+	cargo test --release --workspace $(if $(OIDN_DIR),--features denoise)
 
 # Criterion benches; they print the ratios that matter and assert nothing.
 bench:

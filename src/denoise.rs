@@ -3,7 +3,8 @@
 //!
 //! It is fed the path-traced image and never a reconstructed one, whose noise is correlated between pixels: the
 //! network was trained on independent noise. It is biased and stops improving with more samples; it is here for
-//! comparison, and for those who want it.
+//! comparison, and for those who want it. The guides count as noisy: the crate's `clean_aux` sets a parameter that
+//! the library does not have.
 //!
 //! Compiled in with the feature `denoise`; the build then needs the library's folder in `OIDN_DIR` (README). Without
 //! the feature everything here says so.
@@ -32,8 +33,7 @@ pub fn film(film: &Film) -> Result<Plane> {
 pub fn image(image: &Plane, albedo: &Plane, normal: &Plane) -> Result<Plane> {
     let device = oidn::Device::cpu().map_err(failed)?;
     let mut filter = oidn::RayTracing::try_new(&device).map_err(failed)?;
-    // Guides are averaged over the pixel and next to free of noise; said to be clean, they keep more detail.
-    filter.image_dimensions(image.width, image.height).hdr(true).clean_aux(true);
+    filter.image_dimensions(image.width, image.height).hdr(true);
     filter.albedo_normal(albedo.data.as_flattened(), normal.data.as_flattened());
     let mut result = Plane::new(image.width, image.height);
     filter.filter(image.data.as_flattened(), result.data.as_flattened_mut()).map_err(failed)?;

@@ -55,7 +55,8 @@ pub fn json(job: &Job, report: &Report) -> String {
         .collect();
     let seconds = &report.seconds;
     let rays = &report.statistics.rays;
-    let outputs: Vec<_> = job.outputs.iter().chain(&job.denoised).map(|o| o.path.display().to_string()).collect();
+    let outputs: Vec<_> =
+        job.outputs.iter().chain(&job.denoised).map(|o| o.path.display().to_string()).collect();
     let object = json!({
         "version": 1,
         "gdpt": env!("CARGO_PKG_VERSION"),
