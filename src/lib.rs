@@ -20,3 +20,4 @@ pub mod render;
 pub mod scene;
 pub mod shade;
 pub mod store;
+pub mod study;

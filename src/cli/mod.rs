@@ -3,6 +3,7 @@
 //! Every error is one line on stderr, `gdpt: error: what, where, what to do`; a panic is a bug of ours and says so
 //! the same way.
 
+mod analyze;
 mod compare;
 mod flags;
 mod info;
@@ -50,6 +51,8 @@ enum Command {
     Reconstruct(reconstruct::Flags),
     /// Measure the error of an image against a reference
     Compare(compare::Flags),
+    /// Say how noisy stored buffers are, what the theory expects, and where gradients pay
+    Analyze(analyze::Flags),
     /// Say what is in a scene and what of it is honoured
     Info(info::Flags),
 }
@@ -84,6 +87,7 @@ fn run(arguments: impl Iterator<Item = OsString>) -> u8 {
         Command::Render(flags) => render::run(*flags),
         Command::Reconstruct(flags) => reconstruct::run(&flags),
         Command::Compare(flags) => compare::run(&flags),
+        Command::Analyze(flags) => analyze::run(&flags),
         Command::Info(flags) => info::run(&flags),
     };
     match result {

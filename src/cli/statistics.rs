@@ -20,13 +20,8 @@
 
 use crate::integrate::ShiftOutcome;
 use crate::render::{Job, Report, metadata};
+use crate::study::clock::cpu_seconds;
 use serde_json::{Map, Value, json};
-
-/// CPU time of this process, s.
-fn cpu_seconds() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
 
 /// Most memory this process ever held, bytes.
 fn peak_memory() -> Option<u64> {
