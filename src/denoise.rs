@@ -15,13 +15,17 @@ use crate::film::{Film, Half, Plane};
 /// Whether the program was built with a denoiser.
 pub const AVAILABLE: bool = cfg!(feature = "denoise");
 
-/// The path-traced image of `film`, denoised, very direct light added after it; `film` must hold features.
-pub fn film(film: &Film) -> Result<Plane> {
+/// The path-traced image of `film`, denoised, without very direct light; `film` must hold features.
+pub fn primal(film: &Film) -> Result<Plane> {
     let Some(features) = &film.features else {
         return Err(Error::Usage("a denoiser needs albedo and normals: render with them".into()));
     };
-    let image = image(&film.primal(Half::Both), &features.albedo, &features.normal)?;
-    let direct = film.direct();
+    image(&film.primal(Half::Both), &features.albedo, &features.normal)
+}
+
+/// The whole image: [`primal`] and very direct light, which no denoiser touches.
+pub fn film(film: &Film) -> Result<Plane> {
+    let (image, direct) = (primal(film)?, film.direct());
     let add = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| a[c] + b[c]);
     let data = image.data.iter().zip(&direct.data).map(add).collect();
     Ok(Plane { width: image.width, height: image.height, data })

@@ -1,10 +1,10 @@
 //! Line charts as SVG, by `plotters`: linear or logarithmic axes, the legend below the plot so that nothing covers a
 //! curve. Text stays text, colours stay attributes, so that a page can restyle both.
 
-use plotters::coord::combinators::LogRangeExt;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 use std::error::Error as StdError;
+use std::ops::Range;
 
 /// Width of a chart, in the units of its view box: narrow enough to be read on a phone.
 const WIDTH: u32 = 480;
@@ -77,10 +77,9 @@ fn tick(value: f64) -> String {
     }
 }
 
-/// A logarithmic axis with ticks at powers of ten or, where few of them are in the range, of two.
-fn log_axis(range: std::ops::Range<f64>) -> LogRangeExt<f64> {
-    let base = if range.end / range.start < 300.0 { 2.0 } else { 10.0 };
-    range.log_scale().base(base)
+/// Ticks of a logarithmic axis are at powers of ten or, where few of them are in the range, of two.
+fn base(range: &Range<f64>) -> f64 {
+    if range.end / range.start < 300.0 { 2.0 } else { 10.0 }
 }
 
 impl Scale {
@@ -89,7 +88,7 @@ impl Scale {
     }
 
     /// The range of an axis: all values, with a margin.
-    fn range(self, values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+    fn range(self, values: impl Iterator<Item = f64>) -> Range<f64> {
         let extremes = |(low, high): (f64, f64), v: f64| (low.min(v), high.max(v));
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), extremes);
         match self {
@@ -111,11 +110,14 @@ impl Chart {
         let all = || shown.iter().flat_map(|s| &s.points);
         let x = self.x_scale.range(all().map(|p| p.0));
         let y = self.y_scale.range(all().map(|p| p.1));
+        let (x_base, y_base) = (base(&x), base(&y));
         let drawn = match (self.x_scale, self.y_scale) {
             (Scale::Linear, Scale::Linear) => self.draw(&shown, x, y),
-            (Scale::Linear, Scale::Log) => self.draw(&shown, x, log_axis(y)),
-            (Scale::Log, Scale::Linear) => self.draw(&shown, log_axis(x), y),
-            (Scale::Log, Scale::Log) => self.draw(&shown, log_axis(x), log_axis(y)),
+            (Scale::Linear, Scale::Log) => self.draw(&shown, x, y.log_scale().base(y_base)),
+            (Scale::Log, Scale::Linear) => self.draw(&shown, x.log_scale().base(x_base), y),
+            (Scale::Log, Scale::Log) => {
+                self.draw(&shown, x.log_scale().base(x_base), y.log_scale().base(y_base))
+            }
         };
         drawn.expect("drawing into a string needs no system")
     }

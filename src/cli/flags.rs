@@ -256,7 +256,7 @@ fn fraction(text: &str) -> std::result::Result<f32, String> {
     number(text, |v| (0.0..=1.0).contains(&v), "a number from 0 to 1")
 }
 
-fn size(text: &str) -> std::result::Result<[u32; 2], String> {
+pub fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     let parsed = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     let size: [u32; 2] = parsed.ok_or("is not of the form 1280x720")?;
     if size.iter().any(|&v| v == 0 || v > 1 << 16) || u64::from(size[0]) * u64::from(size[1]) > 1 << 28 {

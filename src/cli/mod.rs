@@ -12,6 +12,7 @@ mod reconstruct;
 mod render;
 mod signals;
 mod statistics;
+mod study;
 mod terminal;
 
 use crate::error::Error;
@@ -53,6 +54,8 @@ enum Command {
     Compare(compare::Flags),
     /// Say how noisy stored buffers are, what the theory expects, and where gradients pay
     Analyze(analyze::Flags),
+    /// Measure path tracing against gradient-domain path tracing: one page with tables, curves and pictures
+    Study(study::Flags),
     /// Say what is in a scene and what of it is honoured
     Info(info::Flags),
 }
@@ -88,6 +91,7 @@ fn run(arguments: impl Iterator<Item = OsString>) -> u8 {
         Command::Reconstruct(flags) => reconstruct::run(&flags),
         Command::Compare(flags) => compare::run(&flags),
         Command::Analyze(flags) => analyze::run(&flags),
+        Command::Study(flags) => study::run(&flags),
         Command::Info(flags) => info::run(&flags),
     };
     match result {

@@ -4,7 +4,7 @@
 //! that differ in their seeds alone, whose noise is measured better.
 
 use super::charts;
-use super::table::{Table, number};
+use super::table::number;
 use crate::analyze::moments::{Energies, Moments, ratio_color};
 use crate::analyze::noise::{Noise, Run};
 use crate::error::{Error, Result};
@@ -105,30 +105,6 @@ fn moments(document: &Document) -> Option<Moments> {
     })
 }
 
-/// Spectra and their theory, bin by bin.
-fn spectra_table(noise: &Noise) -> Table {
-    let mut table = Table::new(&["cycles_per_pixel", "primal", "differences", "result", "equation_7"]);
-    let columns = [&noise.primal_spectrum, &noise.gradient_spectrum, &noise.result_spectrum];
-    let columns = columns.map(|s| s.points());
-    for (frequency, predicted) in noise.predicted_spectrum().points() {
-        let at = |points: &[(f64, f64)]| points.iter().find(|p| p.0 == frequency).map_or(f64::NAN, |p| p.1);
-        let mut row = vec![number(frequency)];
-        row.extend(columns.iter().map(|c| number(at(c))));
-        row.push(number(predicted));
-        table.rows.push(row);
-    }
-    table
-}
-
-/// Gains over α.
-fn sweep_table(noise: &Noise) -> Table {
-    let mut table = Table::new(&["alpha", "predicted_gain", "measured_gain"]);
-    for gain in &noise.sweep {
-        table.rows.push([f64::from(gain.alpha), gain.predicted, gain.measured].map(number).to_vec());
-    }
-    table
-}
-
 impl Inspection {
     /// The model's gain at its best α.
     fn best_predicted(&self) -> f64 {
@@ -212,9 +188,9 @@ impl Inspection {
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>> {
         let noise = &self.noise;
         let mut files: Vec<(&str, Vec<u8>)> = vec![
-            (FILES[0], spectra_table(noise).csv().into_bytes()),
+            (FILES[0], charts::spectra_table(noise).csv().into_bytes()),
             (FILES[1], charts::spectra(noise).svg().into_bytes()),
-            (FILES[2], sweep_table(noise).csv().into_bytes()),
+            (FILES[2], charts::sweep_table(noise).csv().into_bytes()),
             (FILES[3], charts::sweep(noise).svg().into_bytes()),
         ];
         let [width, height] = noise.size;
