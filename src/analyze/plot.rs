@@ -145,7 +145,7 @@ impl Chart {
                 .margin(6)
                 .margin_right(14)
                 .x_label_area_size(46)
-                .y_label_area_size(72)
+                .y_label_area_size(84)
                 .build_cartesian_2d(x, y)?;
             context
                 .configure_mesh()

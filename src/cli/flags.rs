@@ -92,6 +92,17 @@ pub enum ToneMapFlag {
     None,
 }
 
+impl ToneMapFlag {
+    /// The typed curve.
+    pub fn curve(self) -> ToneMap {
+        match self {
+            Self::Agx => ToneMap::Agx,
+            Self::Aces => ToneMap::Aces,
+            Self::None => ToneMap::None,
+        }
+    }
+}
+
 /// Arguments of everything that writes PNG.
 #[derive(Args)]
 pub struct DisplayFlags {
@@ -106,12 +117,7 @@ pub struct DisplayFlags {
 impl DisplayFlags {
     /// Exposure and curve.
     pub fn typed(&self) -> (f32, ToneMap) {
-        let curve = match self.tonemap {
-            ToneMapFlag::Agx => ToneMap::Agx,
-            ToneMapFlag::Aces => ToneMap::Aces,
-            ToneMapFlag::None => ToneMap::None,
-        };
-        (self.exposure, curve)
+        (self.exposure, self.tonemap.curve())
     }
 }
 
@@ -239,7 +245,8 @@ fn number(text: &str, ok: impl Fn(f32) -> bool, what: &str) -> std::result::Resu
     value.ok_or_else(|| format!("is not {what}"))
 }
 
-fn finite(text: &str) -> std::result::Result<f32, String> {
+/// A number.
+pub fn finite(text: &str) -> std::result::Result<f32, String> {
     number(text, |_| true, "a finite number")
 }
 

@@ -1,6 +1,6 @@
 //! `gdpt study`: path tracing against gradient-domain path tracing, measured, as one page.
 
-use super::flags::{DisplayFlags, MethodFlag, size};
+use super::flags::{MethodFlag, ToneMapFlag, finite, size};
 use super::progress::{self, Progress};
 use super::signals::Signals;
 use super::terminal;
@@ -62,8 +62,12 @@ pub struct Flags {
     /// Worker threads [default: one a logical CPU]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     threads: Option<u32>,
-    #[command(flatten)]
-    display: DisplayFlags,
+    /// Exposure of the pictures, in stops [default: the reference's median luminance becomes middle grey]
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = finite)]
+    exposure: Option<f32>,
+    /// Tone mapping of the pictures
+    #[arg(long, value_name = "CURVE", default_value = "agx")]
+    tonemap: ToneMapFlag,
     /// How progress is shown, on stderr
     #[arg(long, value_name = "STYLE", default_value = "auto")]
     progress: progress::Style,
@@ -78,7 +82,6 @@ impl Flags {
         spp.sort_unstable();
         spp.dedup();
         let most = spp.last().copied().unwrap_or(1);
-        let (exposure, tone_map) = self.display.typed();
         let methods = MethodFlag::value_variants().iter().map(|flag| flag.method());
         let cpus = || std::thread::available_parallelism().map_or(1, |n| n.get());
         Ok(Plan {
@@ -91,8 +94,8 @@ impl Flags {
             seed: self.seed,
             threads: self.threads.map_or_else(cpus, |n| n as usize),
             methods: methods.filter(|m| *m != Method::None).collect(),
-            exposure,
-            tone_map,
+            exposure: self.exposure,
+            tone_map: self.tonemap.curve(),
         })
     }
 

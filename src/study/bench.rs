@@ -55,6 +55,8 @@ pub struct Reference {
     pub direct: Plane,
     /// relMSE that its own noise adds to every comparison.
     pub noise: f64,
+    /// Stops at which pictures are shown and compared.
+    pub exposure: f32,
     /// The picture, 8-bit sRGB.
     pub picture: Vec<u8>,
 }
@@ -168,13 +170,10 @@ impl<'a> Bench<'a> {
             0.25 * square / (grey * grey + metrics::REL_MSE_EPSILON)
         };
         let noise = image.data.iter().enumerate().map(square).sum::<f64>() / image.data.len() as f64;
-        let picture = self.picture(&sum(&image, &direct));
-        Ok(Reference { image, direct, noise, picture })
-    }
-
-    /// What `render` would write as PNG, 8-bit sRGB.
-    pub fn picture(&self, whole: &Plane) -> Vec<u8> {
-        png::rgb8(whole, self.plan.exposure, self.plan.tone_map)
+        let whole = sum(&image, &direct);
+        let exposure = self.plan.exposure.unwrap_or_else(|| automatic_exposure(&whole));
+        let picture = png::rgb8(&whole, exposure, self.plan.tone_map);
+        Ok(Reference { image, direct, noise, exposure, picture })
     }
 
     /// The error of a shot.
@@ -182,7 +181,8 @@ impl<'a> Bench<'a> {
         let (width, height) = (reference.image.width, reference.image.height);
         let Comparison { rel_mse, mean_difference, .. } =
             metrics::compare(&shot.image, &reference.image).expect("all images of a study have one size");
-        let picture = self.picture(&shot.whole());
+        // What `render` would write as PNG.
+        let picture = png::rgb8(&shot.whole(), reference.exposure, self.plan.tone_map);
         let flip = flip::mean(&picture, &reference.picture, width, height);
         Score {
             rel_mse: rel_mse - reference.noise,
@@ -192,6 +192,16 @@ impl<'a> Bench<'a> {
     }
 }
 
+/// The stops, to a tenth, that bring the median luminance of what is not black to middle grey; 0 for a black image.
+fn automatic_exposure(image: &Plane) -> f32 {
+    let luminance = |v: &[f32; 3]| 0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2];
+    let mut values: Vec<f32> =
+        image.data.iter().map(luminance).filter(|l| *l > 0.0 && l.is_finite()).collect();
+    values.sort_by(f32::total_cmp);
+    let stops = values.get(values.len() / 2).map_or(0.0, |median| (0.18 / median).log2());
+    (stops.clamp(-30.0, 30.0) * 10.0).round() / 10.0
+}
+
 /// The image of a film of gradients that took `render_seconds`.
 pub fn solve(film: &Film, method: Method, render_seconds: f64) -> Shot {
     let (image, solve_seconds) = clock::timed(|| {
@@ -199,4 +209,16 @@ pub fn solve(film: &Film, method: Method, render_seconds: f64) -> Shot {
         reconstruct(&Input { primal: &primal, dx: &dx, dy: &dy }, method, ALPHA).image
     });
     Shot { image, direct: film.direct(), render_seconds, solve_seconds }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exposure_brings_the_median_of_what_is_lit_to_middle_grey() {
+        let image = Plane::from_fn(5, 1, |x, _| [[0.0, 0.0, 0.045, 0.045, 90.0][x]; 3]);
+        assert_eq!(automatic_exposure(&image), 2.0);
+        assert_eq!(automatic_exposure(&Plane::new(4, 4)), 0.0);
+    }
 }

@@ -84,8 +84,8 @@ pub struct Plan {
     pub threads: usize,
     /// Reconstructions to compare; the default one is shown in the pictures.
     pub methods: Vec<Method>,
-    /// Stops, for pictures.
-    pub exposure: f32,
+    /// Stops, for pictures; each scene's own, by its reference, where there is none.
+    pub exposure: Option<f32>,
     /// For pictures.
     pub tone_map: ToneMap,
 }

@@ -67,19 +67,19 @@ fn facts(plan: &Plan) -> Vec<(&'static str, String)> {
         ("longest path", format!("{} vertices after the camera's", plan.max_depth)),
         ("seeds", format!("{} a number of samples, from {}", plan.rounds, plan.seed)),
         ("reference", format!("path tracing of this program, {} spp, other seeds", plan.reference_spp)),
-        ("pictures", format!("tone curve {tone} at {:+} EV, as gdpt render writes PNG", plan.exposure)),
+        ("pictures", format!("tone curve {tone} as gdpt render writes PNG; exposures are with the scenes")),
         ("threads", plan.threads.to_string()),
     ]
 }
 
 fn section<'a>(plan: &Plan, measured: &'a Measured, tables: &'a Tables, index: usize) -> Result<Section<'a>> {
     let groups = pictures::groups(plan, measured, index)?;
-    // The wipe starts with path tracing and ours at the shown number of samples: the ladder is the first group, the
-    // reference its first picture, then pairs.
+    // The wipe starts with path tracing and ours at the shown number of samples: the ladder is the first group, of
+    // pairs.
     let rung = plan.spp.iter().position(|s| *s == plan.shown_spp()).unwrap_or(0);
     let id =
         |i: usize| groups.first().and_then(|g| g.pictures.get(i)).map(|p| p.id.clone()).unwrap_or_default();
-    let (left, right) = (id(1 + 2 * rung), id(2 + 2 * rung));
+    let (left, right) = (id(2 * rung), id(2 * rung + 1));
     Ok(Section {
         anchor: format!("scene-{index}"),
         name: &measured.name,

@@ -50,7 +50,7 @@ struct Studio<'a> {
 
 impl Studio<'_> {
     fn rgb8(&self, whole: &Plane) -> Vec<u8> {
-        png::rgb8(whole, self.plan.exposure, self.plan.tone_map)
+        png::rgb8(whole, self.measured.reference.exposure, self.plan.tone_map)
     }
 
     fn encoded(&mut self, pixels: &[u8], size: [usize; 2], label: String, alt: String) -> Result<Picture> {
@@ -104,22 +104,20 @@ pub fn groups(plan: &Plan, measured: &Measured, index: usize) -> Result<Vec<Grou
     let mut studio = Studio { plan, measured, prefix: format!("p{index}"), count: 0 };
     let best = Side::Gradient(Method::default());
     let shown = plan.shown_spp();
-    Ok(vec![
-        ladder(&mut studio, best)?,
-        methods(&mut studio, best, shown)?,
-        crops(&mut studio, best, shown)?,
-        weights(&mut studio)?,
-        quartet(&mut studio, best, shown)?,
-    ])
+    let mut groups = vec![ladder(&mut studio, best)?, methods(&mut studio, best, shown)?];
+    groups.extend(crops(&mut studio, best, shown)?);
+    groups.extend([weights(&mut studio)?, quartet(&mut studio, best, shown)?]);
+    Ok(groups)
 }
 
 fn ladder(studio: &mut Studio, best: Side) -> Result<Group> {
-    let mut pictures = vec![studio.reference()?];
+    let mut pictures = Vec::new();
     for &spp in &studio.plan.spp {
         for side in [Side::Path, best] {
             pictures.extend(studio.cell(side, spp)?);
         }
     }
+    pictures.push(studio.reference()?);
     let text =
         format!("Path tracing (PT) beside gradient-domain path tracing ({}) at equal samples.", best.name());
     Ok(Group { title: "More samples".into(), text, crops: false, pictures })
@@ -179,36 +177,41 @@ fn extremes(path: &Plane, best: &Plane, reference: &Plane) -> [[usize; 2]; 2] {
     [place(most), place(least)]
 }
 
-fn crops(studio: &mut Studio, best: Side, shown: u32) -> Result<Group> {
+/// Crops of all methods at two places: one group each.
+fn crops(studio: &mut Studio, best: Side, shown: u32) -> Result<Vec<Group>> {
     let measured = studio.measured;
     let (spp, equal, _) = &measured.equal_time;
     let reference = sum(&measured.reference.image, &measured.reference.direct);
     let mut shots = vec![("reference".to_owned(), reference)];
-    let image = |side: Side| measured.cell(side, shown).map(|c| (c.side.name(), c.shot.whole()));
-    shots.extend(image(Side::Path).map(|(name, plane)| (format!("{name}, {shown} spp"), plane)));
+    let image = |side: Side| {
+        measured.cell(side, shown).map(|c| (format!("{}, {shown} spp", side.name()), c.shot.whole()))
+    };
+    shots.extend(image(Side::Path));
     shots.push((format!("PT, {spp} spp (equal time)"), equal.whole()));
-    let others = measured.sides().into_iter().filter(|s| *s != Side::Path);
-    shots.extend(others.filter_map(image).map(|(name, plane)| (format!("{name}, {shown} spp"), plane)));
-    let mut pictures = Vec::new();
-    if let (Some(path), Some(ours)) = (measured.cell(Side::Path, shown), measured.cell(best, shown)) {
-        let blocks = extremes(&path.shot.image, &ours.shot.image, &measured.reference.image);
-        for (block, which) in blocks.into_iter().zip(["most gain", "least gain"]) {
-            for (name, plane) in &shots {
-                let [x0, y0, x1, y1] = window(block, [plane.width, plane.height]);
-                let part = Plane::from_fn(x1 - x0, y1 - y0, |x, y| plane.at(x0 + x, y0 + y));
-                pictures.push(studio.whole(
-                    &part,
-                    format!("{which}: {name}"),
-                    &format!("crop with the {which}, {name}"),
-                )?);
-            }
+    shots.extend(measured.sides().into_iter().filter(|s| *s != Side::Path).filter_map(image));
+    let (Some(path), Some(ours)) = (measured.cell(Side::Path, shown), measured.cell(best, shown)) else {
+        return Ok(Vec::new());
+    };
+    let blocks = extremes(&path.shot.image, &ours.shot.image, &measured.reference.image);
+    let name = best.name();
+    let titles =
+        [format!("Where {name} gains most, {shown} spp"), format!("Where {name} gains least, {shown} spp")];
+    let mut groups = Vec::new();
+    for (block, title) in blocks.into_iter().zip(titles) {
+        let mut pictures = Vec::new();
+        for (name, plane) in &shots {
+            let [x0, y0, x1, y1] = window(block, [plane.width, plane.height]);
+            let part = Plane::from_fn(x1 - x0, y1 - y0, |x, y| plane.at(x0 + x, y0 + y));
+            pictures.push(studio.whole(&part, name.clone(), &format!("crop: {name}"))?);
         }
+        let text = format!(
+            "The block of 16\u{d7}16 pixels, with what is around it, whose error over path tracing's \
+                            at equal samples is the {} of the image.",
+            if groups.is_empty() { "least" } else { "greatest" }
+        );
+        groups.push(Group { title, text, crops: true, pictures });
     }
-    let text = format!(
-        "Where {} gains most over path tracing at equal samples, and where it gains least or loses.",
-        best.name()
-    );
-    Ok(Group { title: format!("Crops, {shown} spp"), text, crops: true, pictures })
+    Ok(groups)
 }
 
 fn weights(studio: &mut Studio) -> Result<Group> {

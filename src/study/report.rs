@@ -71,21 +71,27 @@ fn results(measured: &Measured) -> Table {
 
 /// How each method's error falls, and from where on it beats the denoiser at equal time.
 fn methods(measured: &Measured) -> Table {
-    let mut table = Table::new(&["method", "slope_of_rel_mse_over_spp", "beats_oidn_from_spp"]);
+    let mut table = Table::new(&["method", "slope_of_rel_mse_over_spp"]);
     let over_time = |side: Side| -> Vec<(f64, f64)> {
         measured.curve(side).into_iter().map(|(_, seconds, error, _)| (seconds, error)).collect()
     };
     let denoised = over_time(Side::Denoised);
+    if !denoised.is_empty() {
+        table.header.push("beats_oidn_from_spp".into());
+    }
     for side in measured.sides() {
         let curve = measured.curve(side);
         let slope = fit::slope(&curve.iter().map(|p| (p.0, p.2)).collect::<Vec<_>>());
-        let beats = |p: &&(f64, f64, f64, f64)| p.2 <= fit::interpolate(&denoised, p.1);
-        let from = match curve.iter().find(beats) {
-            _ if denoised.is_empty() || side == Side::Denoised => String::new(),
-            Some(point) => point.0.to_string(),
-            None => "never here".into(),
-        };
-        table.rows.push(vec![side.name(), number(slope), from]);
+        let mut row = vec![side.name(), number(slope)];
+        if !denoised.is_empty() {
+            let beats = |p: &&(f64, f64, f64, f64)| p.2 <= fit::interpolate(&denoised, p.1);
+            row.push(match curve.iter().find(beats) {
+                _ if side == Side::Denoised => String::new(),
+                Some(point) => point.0.to_string(),
+                None => "never here".into(),
+            });
+        }
+        table.rows.push(row);
     }
     table
 }
@@ -103,12 +109,13 @@ fn facts(plan: &Plan, measured: &Measured) -> Table {
     let mut table = Table::new(&["name", "value"]);
     let mut row = |name: &str, value: String| table.rows.push(vec![name.into(), value]);
     row("triangles", measured.triangles.to_string());
+    row("exposure of the pictures (EV)", measured.reference.exposure.to_string());
     row("relMSE of the reference's own noise", number(measured.reference.noise));
     row("CPU ns a sample of PT", number(path));
     row("CPU ns a sample of G-PT", number(gradient));
     row("cost of G-PT over PT", number(gradient / path));
     row("PT samples in the CPU time of the shown picture", equal_spp.to_string());
-    row("relMSE of PT with these, one render", number(equal.rel_mse));
+    row("relMSE of one render of PT with these", number(equal.rel_mse));
     row("alpha* (best alpha by the model)", number(noise.alpha_star()));
     row("variance gain of L2 predicted there", number(noise.predicted_gain(noise.alpha_star() as f32)));
     row("best variance gain of L2 measured", number(best.map_or(f64::NAN, |g| g.measured)));
