@@ -56,7 +56,7 @@ fn guides_have_a_say() {
     }
     // Noise about a checkerboard that the albedo shows: with it the edges stay.
     let (width, height) = (96, 96);
-    let board = |x: usize, y: usize| if (x / 3 + y / 3) % 2 == 0 { 0.2 } else { 0.7 };
+    let board = |x: usize, y: usize| if (x / 3 + y / 3).is_multiple_of(2) { 0.2 } else { 0.7 };
     let noise = |i: usize| (gdpt::math::sampler::hash(i as u32, 7) as f32 / 2f32.powi(32) - 0.5) * 3.0;
     let truth = Plane::from_fn(width, height, |x, y| [board(x, y); 3]);
     let image =

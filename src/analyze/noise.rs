@@ -10,10 +10,9 @@ use super::spectrum::{Kind, Spectrum};
 use crate::film::Plane;
 use crate::reconstruct::{Input, Method, reconstruct};
 
-/// Values of α a sweep solves for: two an octave from 1/64 to 4.
+/// Values of α a sweep solves for: about two an octave from 1/64 to 4.
 pub const SWEEP: [f32; 17] = [
-    0.015_625, 0.022_1, 0.031_25, 0.044_2, 0.062_5, 0.088_4, 0.125, 0.176_8, 0.25, 0.353_6, 0.5, 0.707_1,
-    1.0, 1.414_2, 2.0, 2.828_4, 4.0,
+    0.0156, 0.022, 0.031, 0.044, 0.0625, 0.088, 0.125, 0.177, 0.25, 0.354, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0,
 ];
 
 /// One independent estimate of an image and its differences.

@@ -180,7 +180,7 @@ mod tests {
         let (w, h) = (48, 36);
         let plane = noise(w, h, 0.3, 6);
         let mut planner = DctPlanner::new();
-        let mut want = vec![0.0; BINS];
+        let mut want = [0.0; BINS];
         for c in 0..3 {
             let field = plane.data.iter().map(|v| f64::from(v[c])).collect();
             let rows = transform(&mut planner, field, w, false);

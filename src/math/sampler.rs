@@ -163,12 +163,7 @@ pub fn sample_4d_wide(stream_seeds: &[u32; LANES], indices: &[u32; LANES], set: 
     // Written out, so that the four chains of multiplications overlap.
     let [a, b, c, d] = points;
     let [salt_a, salt_b, salt_c, salt_d] = SALTS;
-    [
-        finish(a, seed, salt_a),
-        finish(b, seed, salt_b),
-        finish(c, seed, salt_c),
-        finish(d, seed, salt_d),
-    ]
+    [finish(a, seed, salt_a), finish(b, seed, salt_b), finish(c, seed, salt_c), finish(d, seed, salt_d)]
 }
 
 #[cfg(test)]

@@ -172,14 +172,15 @@ fn climb(bench: &Bench, reference: &Reference, round: u64, tallies: &mut Vec<Tal
             add(tallies, Side::Path, spp, bench.path(spp, seed)?);
             Ok(())
         };
-        if round % 2 == 0 {
+        let path_first = round.is_multiple_of(2);
+        if path_first {
             path(tallies)?;
         }
         let (film, seconds) = bench.gradients(spp, seed)?;
         for &method in &plan.methods {
             add(tallies, Side::Gradient(method), spp, solve(&film, method, seconds));
         }
-        if round % 2 == 1 {
+        if !path_first {
             path(tallies)?;
         }
         if denoise::AVAILABLE {

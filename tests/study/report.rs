@@ -55,7 +55,12 @@ fn between<'a>(text: &'a str, open: &str, close: &str) -> Vec<&'a str> {
 
 /// The cells of the tables in the page, by the file each is also in.
 fn tables(html: &str) -> BTreeMap<String, Vec<Vec<String>>> {
-    let cell = |text: &str| text.split('>').next_back().unwrap_or_default().to_owned();
+    let cell = |text: &str| {
+        let text = text.split('>').next_back().unwrap_or_default();
+        [("&#60;", "<"), ("&#62;", ">"), ("&#34;", "\""), ("&#39;", "'"), ("&#38;", "&")]
+            .iter()
+            .fold(text.to_owned(), |text, (escaped, plain)| text.replace(escaped, plain))
+    };
     let table = |text: &str| {
         let name = text.split('"').next().unwrap_or_default().to_owned();
         let rows = between(text, "<tr>", "</tr>");
