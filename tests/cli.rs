@@ -231,6 +231,8 @@ fn help_has_examples_and_goes_to_stdout() {
         &["render", "--help"],
         &["reconstruct", "--help"],
         &["compare", "--help"],
+        &["analyze", "--help"],
+        &["study", "--help"],
         &["info", "--help"],
     ] {
         let output = gdpt(folder.path(), command);

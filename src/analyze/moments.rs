@@ -34,9 +34,9 @@ pub struct Energies {
     pub dx: f64,
     /// ‖G‖² of vertical differences.
     pub dy: f64,
-    /// Var[dx]/Var[primal] a pixel; NaN in the last column and where neither pixel has any variance.
+    /// Variance of dx over that of the primal, a pixel; NaN in the last column and where neither pixel has any variance.
     pub dx_ratio: Vec<f64>,
-    /// Var[dy]/Var[primal] a pixel; NaN in the last row and where neither pixel has any variance.
+    /// Variance of dy over that of the primal, a pixel; NaN in the last row and where neither pixel has any variance.
     pub dy_ratio: Vec<f64>,
 }
 
