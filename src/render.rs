@@ -13,9 +13,9 @@ use self::prepare::{check_memory, load};
 use crate::accel::embree::flush_denormals;
 use crate::accel::{Accel, EmbreeAccel, ObvhsAccel};
 use crate::error::{Error, Result};
-use crate::film::{Film, Half, Plane};
+use crate::film::{Buffers, Film, Half, Plane};
 use crate::integrate::{self, Statistics};
-use crate::reconstruct::{Input, Method, reconstruct};
+use crate::reconstruct::{Alpha, Input, Method, Solution, reconstruct};
 use crate::scene::{Camera, LoadReport, Scene};
 use crate::store::{Window, atomic, exr, layers, png};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -54,6 +54,37 @@ impl Seconds {
     }
 }
 
+/// How an image was found, without the image.
+#[derive(Clone, Copy, Debug)]
+pub struct Solve {
+    /// The method, `auto` resolved.
+    pub method: Method,
+    /// α, where the method has one.
+    pub alpha: Option<f32>,
+    /// Relative residual.
+    pub residual: f64,
+    /// Steps or reweightings.
+    pub iterations: usize,
+    /// Measurements the solve did without because they were not finite.
+    pub missing: usize,
+    /// Estimated relMSE of the image; `None` below two samples.
+    pub rel_mse: Option<f64>,
+}
+
+impl Solve {
+    fn of(solution: &Solution) -> Self {
+        let Solution { method, alpha, residual, iterations, missing, error, .. } = solution;
+        Self {
+            method: *method,
+            alpha: *alpha,
+            residual: *residual,
+            iterations: *iterations,
+            missing: *missing,
+            rel_mse: error.as_ref().map(|e| e.rel_mse),
+        }
+    }
+}
+
 /// What a finished render has to say.
 #[derive(Clone, Debug)]
 pub struct Report {
@@ -69,15 +100,10 @@ pub struct Report {
     pub triangles: u64,
     /// Samples over all pixels.
     pub samples: u64,
-    /// Root of the variance of the mean primal, averaged over pixels and channels, W·m⁻²·sr⁻¹; `None` below two
-    /// samples.
-    pub error_estimate: Option<f64>,
-    /// Relative residual of the solve; `None` without one.
-    pub residual: Option<f64>,
+    /// How the image was found.
+    pub solve: Solve,
     /// Samples dropped because they were not finite.
     pub dropped_samples: u64,
-    /// Measurements the solve did without because they were not finite.
-    pub missing: usize,
     /// Threads that worked.
     pub threads: usize,
 }
@@ -110,7 +136,7 @@ pub fn run(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Repo
     let (film, statistics) = rendered?;
 
     monitor.stage("reconstruct");
-    let (solved, time) = timed(|| work.pool.install(|| solve(&film, job.method, job.alpha)));
+    let (solved, time) = timed(|| work.pool.install(|| solve(&film.buffers(), job.method, job.alpha)));
     seconds.reconstruct = time;
     work.go_on()?;
 
@@ -126,10 +152,8 @@ pub fn run(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Repo
         size: [film.width as u32, film.height as u32],
         triangles: scene.triangle_count(),
         samples: film.width as u64 * film.height as u64 * u64::from(film.samples(Half::Both)),
-        error_estimate: error_estimate(&film),
-        residual: solved.residual,
+        solve: Solve::of(&solved.solution),
         dropped_samples: film.dropped_samples,
-        missing: solved.missing,
         threads: job.threads,
     })
 }
@@ -196,64 +220,31 @@ fn go_on(cancel: &AtomicBool) -> Result<()> {
 /// Fails where the job is strict and its render left something out; the images are written nevertheless.
 pub fn check_strict(job: &Job, report: &Report) -> Result<()> {
     let dropped = report.dropped_samples;
-    if job.strict && (dropped > 0 || report.missing > 0) {
-        let what = format!("{dropped} samples dropped, {} measurements missing", report.missing);
+    if job.strict && (dropped > 0 || report.solve.missing > 0) {
+        let what = format!("{dropped} samples dropped, {} measurements missing", report.solve.missing);
         return Err(prepare::strict(job, &what));
     }
     Ok(())
 }
 
-/// The finished image and how well it solves its equations.
+/// The finished image and how it was found.
 #[derive(Clone, Debug)]
 pub struct Solved {
     /// Very direct light included.
     pub image: Plane,
-    /// Relative residual; `None` where nothing was solved.
-    pub residual: Option<f64>,
-    /// Measurements that were not finite and had no say.
-    pub missing: usize,
+    /// How the image without it was found.
+    pub solution: Solution,
 }
 
-/// The image of a film: solved for, or primal plus very direct light.
-fn solve(film: &Film, method: Method, alpha: f32) -> Solved {
-    let both = Half::Both;
-    if film.has_gradients {
-        solve_planes(&film.primal(both), &film.dx(both), &film.dy(both), &film.direct(), method, alpha)
-    } else {
-        Solved { image: sum(&film.primal(both), &film.direct()), residual: None, missing: 0 }
-    }
-}
-
-/// The image of buffers.
-fn solve_planes(
-    primal: &Plane,
-    dx: &Plane,
-    dy: &Plane,
-    direct: &Plane,
-    method: Method,
-    alpha: f32,
-) -> Solved {
-    if method == Method::None {
-        return Solved { image: sum(primal, direct), residual: None, missing: 0 };
-    }
-    let solution = reconstruct(&Input { primal, dx, dy }, method, alpha);
-    Solved {
-        image: sum(&solution.image, direct),
-        residual: Some(solution.residual),
-        missing: solution.missing,
-    }
+/// The image of a film's means: solved for, or the primal, plus very direct light.
+fn solve(buffers: &Buffers, method: Method, alpha: Alpha) -> Solved {
+    let solution = reconstruct(&Input::from(buffers), method, alpha);
+    Solved { image: sum(&solution.image, &buffers.direct), solution }
 }
 
 fn sum(a: &Plane, b: &Plane) -> Plane {
     let add = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| a[c] + b[c]);
     Plane { width: a.width, height: a.height, data: a.data.iter().zip(&b.data).map(add).collect() }
-}
-
-/// Root of the mean variance of the primal.
-fn error_estimate(film: &Film) -> Option<f64> {
-    let variance = film.variance();
-    let sum: f64 = variance.data.iter().flatten().map(|&v| f64::from(v)).sum();
-    (film.samples(Half::Both) > 1).then(|| (sum / (3 * variance.data.len()).max(1) as f64).sqrt())
 }
 
 fn write(job: &Job, film: &Film, camera: &Camera, solved: &Solved) -> Result<()> {
@@ -269,7 +260,7 @@ fn write(job: &Job, film: &Film, camera: &Camera, solved: &Solved) -> Result<()>
                     .map(|[x0, y0, ..]| Window { full: [settings.width, settings.height], origin: [x0, y0] });
                 metadata::set_camera(&mut document, camera, settings.width, settings.height);
                 metadata::set_job(&mut document, job)?;
-                metadata::set_solve(&mut document, job.method, job.alpha, solved.residual);
+                metadata::set_solve(&mut document, &Solve::of(&solved.solution));
                 exr::write(&output.path, &document)?;
             }
         }

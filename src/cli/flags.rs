@@ -3,7 +3,7 @@
 use super::progress;
 use crate::error::{Error, Result};
 use crate::integrate::{Filter, Kind, Settings};
-use crate::reconstruct::Method;
+use crate::reconstruct::{Alpha, Method};
 use crate::render::{Backend, CameraChoice, EnvironmentOptions, Format, Job, Lens, Output, Source};
 use crate::scene::{LightUnit, LoadOptions};
 use crate::store::layers::Layer;
@@ -43,6 +43,10 @@ pub enum MethodFlag {
     L1,
     /// Least squares: unbiased
     L2,
+    /// Least squares, each measurement weighed by its noise: the least error
+    Weighted,
+    /// The one with the least estimated error
+    Auto,
     /// The sampled image, gradients unused
     None,
 }
@@ -53,6 +57,8 @@ impl MethodFlag {
         match self {
             Self::L1 => Method::L1,
             Self::L2 => Method::L2,
+            Self::Weighted => Method::Weighted,
+            Self::Auto => Method::Auto,
             Self::None => Method::None,
         }
     }
@@ -150,12 +156,12 @@ pub struct RenderFlags {
     /// Pixel filter
     #[arg(long, value_name = "FILTER", default_value = "box")]
     filter: FilterFlag,
-    /// How the image is found from samples and gradients [default: l1; none with --integrator pt]
+    /// How the image is found from samples and gradients [default: weighted; none with --integrator pt]
     #[arg(long, value_name = "NORM")]
     reconstruct: Option<MethodFlag>,
-    /// Weight of the samples against the gradients in the reconstruction
-    #[arg(long, value_name = "X", default_value_t = 0.2, value_parser = positive)]
-    alpha: f32,
+    /// Weight of the samples against the gradients, for l1 and l2: a number, or auto for that of the measured noise
+    #[arg(long, value_name = "X|auto", default_value = "0.2", value_parser = alpha)]
+    alpha: Alpha,
     /// Roughness (GGX alpha) up to which a bounce is shifted as a mirror's
     #[arg(long, value_name = "ROUGHNESS", default_value_t = 0.001, value_parser = fraction)]
     shift_threshold: f32,
@@ -238,9 +244,16 @@ fn finite(text: &str) -> std::result::Result<f32, String> {
     number(text, |_| true, "a finite number")
 }
 
-/// A number above zero.
-pub fn positive(text: &str) -> std::result::Result<f32, String> {
+fn positive(text: &str) -> std::result::Result<f32, String> {
     number(text, |v| v > 0.0, "a number above 0")
+}
+
+/// `auto` or a number above zero.
+pub fn alpha(text: &str) -> std::result::Result<Alpha, String> {
+    if text == "auto" {
+        return Ok(Alpha::Auto);
+    }
+    number(text, |v| v > 0.0, "auto or a number above 0").map(Alpha::Fixed)
 }
 
 fn non_negative(text: &str) -> std::result::Result<f32, String> {
@@ -386,7 +399,7 @@ impl RenderFlags {
     fn method(&self) -> Result<(Kind, Method)> {
         let method = self.reconstruct.map(MethodFlag::method);
         match (self.integrator, method) {
-            (IntegratorFlag::Gpt, method) => Ok((Kind::GradientPath, method.unwrap_or(Method::L1))),
+            (IntegratorFlag::Gpt, method) => Ok((Kind::GradientPath, method.unwrap_or_default())),
             (IntegratorFlag::Pt, None | Some(Method::None)) => Ok((Kind::Path, Method::None)),
             (IntegratorFlag::Pt, Some(_)) => {
                 Err(usage("--reconstruct needs gradients: use --integrator gpt".into()))

@@ -69,7 +69,8 @@ const SEQUENCE: u32 = 1 << 16;
 #[inline]
 pub fn sample_4d(stream_seed: u32, index: u32, set: u32) -> [f32; 4] {
     // Each set is a four-dimensional sequence of its own, decorrelated by its scramble (padding).
-    let scramble = hash(stream_seed, set.wrapping_add((index / SEQUENCE).wrapping_mul(0x1_0001)));
+    let (half, index) = (index << 31, index >> 1);
+    let scramble = hash(stream_seed, set.wrapping_add((index / SEQUENCE).wrapping_mul(0x1_0001)) ^ half);
     sobol_burley::sample_4d(index % SEQUENCE, 0, scramble)
 }
 
@@ -133,8 +134,9 @@ fn sobol_hash(x: u32x16) -> u32x16 {
 /// [`sample_4d`] for sixteen lanes, each with its own stream and sample index.
 #[inline]
 pub fn sample_4d_wide(stream_seeds: &[u32; LANES], indices: &[u32; LANES], set: u32) -> [f32x16; 4] {
-    let index = u32x16::new(*indices);
-    let epoch = (index >> 16_u32) * u32x16::splat(0x1_0001) + u32x16::splat(set);
+    let half = u32x16::new(*indices) << 31_u32;
+    let index = u32x16::new(*indices) >> 1_u32;
+    let epoch = ((index >> 16_u32) * u32x16::splat(0x1_0001) + u32x16::splat(set)) ^ half;
     let seed = hash_wide(u32x16::new(*stream_seeds), epoch);
     let index = index & u32x16::splat(SEQUENCE - 1);
     let shuffled = owen_scramble_reversed(reverse_bits(index), sobol_hash(seed ^ u32x16::splat(0x79c6_8e4a)));

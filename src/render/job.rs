@@ -1,7 +1,7 @@
 //! A render, fully specified: the command line after all defaults and checks.
 
 use crate::integrate::Settings;
-use crate::reconstruct::Method;
+use crate::reconstruct::{Alpha, Method};
 use crate::scene::LoadOptions;
 use crate::store::layers::Layer;
 use crate::store::png::ToneMap;
@@ -124,7 +124,7 @@ pub struct Job {
     /// How the image is solved for.
     pub method: Method,
     /// Weight of the primal against the gradients.
-    pub alpha: f32,
+    pub alpha: Alpha,
     /// Layers of the EXR beside the image.
     pub layers: Vec<Layer>,
     /// Whether the EXR keeps what is needed to solve again.

@@ -1,6 +1,7 @@
 //! What decided an image, as text attributes of its file: equal attributes mean equal pixels. No host, clock,
 //! timing or thread count.
 
+use super::Solve;
 use super::job::{CameraChoice, Job, Source};
 use crate::error::{Error, Result};
 use crate::integrate::{Filter, Kind};
@@ -32,6 +33,8 @@ pub fn method_name(method: Method) -> &'static str {
     match method {
         Method::L1 => "l1",
         Method::L2 => "l2",
+        Method::Weighted => "weighted",
+        Method::Auto => "auto",
         Method::None => "none",
     }
 }
@@ -114,14 +117,16 @@ pub(super) fn set_job(document: &mut Document, job: &Job) -> Result<()> {
 }
 
 /// Adds how the image was solved for.
-pub(super) fn set_solve(document: &mut Document, method: Method, alpha: f32, residual: Option<f64>) {
-    set(document, "norm", method_name(method).into());
+pub(super) fn set_solve(document: &mut Document, solve: &Solve) {
+    set(document, "norm", method_name(solve.method).into());
     for name in ["gdpt/alpha", "gdpt/residual"] {
         document.attributes.remove(name);
     }
-    if let Some(residual) = residual {
+    if let Some(alpha) = solve.alpha {
         set(document, "alpha", alpha.to_string());
-        set(document, "residual", format!("{residual:e}"));
+    }
+    if solve.method != Method::None {
+        set(document, "residual", format!("{:e}", solve.residual));
     }
 }
 
