@@ -43,8 +43,10 @@ pub enum MethodFlag {
     L1,
     /// Least squares: unbiased
     L2,
-    /// Least squares, each measurement weighed by its noise: the least error
+    /// Least squares, each measurement weighed by its noise
     Weighted,
+    /// The weighted image, single bad pixels mended by what the first hits tell: the least error
+    Guided,
     /// The one with the least estimated error
     Auto,
     /// The sampled image, gradients unused
@@ -58,6 +60,7 @@ impl MethodFlag {
             Self::L1 => Method::L1,
             Self::L2 => Method::L2,
             Self::Weighted => Method::Weighted,
+            Self::Guided => Method::Guided,
             Self::Auto => Method::Auto,
             Self::None => Method::None,
         }
@@ -156,7 +159,7 @@ pub struct RenderFlags {
     /// Pixel filter
     #[arg(long, value_name = "FILTER", default_value = "box")]
     filter: FilterFlag,
-    /// How the image is found from samples and gradients [default: weighted; none with --integrator pt]
+    /// How the image is found from samples and gradients [default: guided; none with --integrator pt]
     #[arg(long, value_name = "NORM")]
     reconstruct: Option<MethodFlag>,
     /// Weight of the samples against the gradients, for l1 and l2: a number, or auto for that of the measured noise
@@ -363,7 +366,10 @@ impl RenderFlags {
             },
             shift_threshold: self.shift_threshold,
             pair_mis: self.pair_mis == Switch::On,
-            features: layers.iter().any(|l| l.needs_features()) || self.background == Switch::Off,
+            features: layers.iter().any(|l| l.needs_features())
+                || self.buffers
+                || self.background == Switch::Off
+                || matches!(method, Method::Guided | Method::Auto),
         };
         let cpus = || std::thread::available_parallelism().map_or(1, |n| n.get());
         Ok(Job {

@@ -27,7 +27,7 @@ pub struct Flags {
     #[arg(short, long, value_name = "OUT", required = true)]
     output: Vec<PathBuf>,
     /// How the image is found from samples and gradients
-    #[arg(long, value_name = "NORM", default_value = "weighted")]
+    #[arg(long, value_name = "NORM", default_value = "guided")]
     reconstruct: MethodFlag,
     /// Weight of the samples against the gradients, for l1 and l2: a number, or auto for that of the measured noise
     #[arg(long, value_name = "X|auto", default_value = "0.2", value_parser = alpha)]

@@ -4,7 +4,7 @@ use super::estimate::ErrorEstimate;
 use super::noise::Noise;
 use super::rows::Problem;
 use super::weighted::Solver;
-use super::{Alpha, Found, Input, Method, Solution, l1, l2};
+use super::{Alpha, Found, Input, Method, Solution, guided, l1, l2};
 use crate::film::{Measured, Plane};
 
 /// α where nothing tells a better one.
@@ -27,7 +27,7 @@ fn solution(
     missing: usize,
     halves: Option<[Plane; 2]>,
 ) -> Solution {
-    let error = halves.map(|[a, b]| ErrorEstimate::new(&found.image, [&a, &b]));
+    let error = halves.map(|[a, b]| ErrorEstimate::new(&found.image, [&a, &b], None));
     let Found { image, residual, iterations } = found;
     Solution { image, method, alpha, residual, iterations, missing, error }
 }
@@ -46,14 +46,28 @@ pub(super) fn uniform(input: &Input, method: Method, alpha: Alpha) -> Solution {
     solution(found, method, Some(alpha), missing, halves)
 }
 
-/// Weighted; L1 where nothing tells the weights.
-pub(super) fn weighted(input: &Input, alpha: Alpha) -> Solution {
+/// Weighted or guided; L1 where nothing tells the weights, weighted where nothing guides.
+pub(super) fn weighted(input: &Input, alpha: Alpha, method: Method) -> Solution {
     let Some(halves) = input.halves else { return uniform(input, Method::L1, alpha) };
-    let problem = Problem::new(input.all);
-    let mut solver = Solver::new(&problem, halves);
-    let found = solver.solve(&problem);
-    let [a, b] = [&halves[0], &halves[1]].map(|half| solver.solve(&Problem::new(half)).image);
-    solution(found, Method::Weighted, None, problem.missing, Some([a, b]))
+    let problems = [Problem::new(&halves[0]), Problem::new(&halves[1])];
+    let mut solver = Solver::new(&problems, halves);
+    let found = [solver.solve(&problems[0]), solver.solve(&problems[1])];
+    let residual = found[0].residual.max(found[1].residual);
+    let iterations = found[0].iterations.max(found[1].iterations);
+    let mut images = found.map(|f| f.image);
+    let guide = input.features.filter(|_| method == Method::Guided);
+    let bias = guide.map(|features| guided::clean(features, &mut images));
+    let [a, b] = &images;
+    let image = mean(a, b);
+    let error = ErrorEstimate::new(&image, [a, b], bias.as_deref());
+    let method = if bias.is_some() { Method::Guided } else { Method::Weighted };
+    let missing = problems[0].missing.max(problems[1].missing);
+    Solution { image, method, alpha: None, residual, iterations, missing, error: Some(error) }
+}
+
+fn mean(a: &Plane, b: &Plane) -> Plane {
+    let data = a.data.iter().zip(&b.data).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c])));
+    Plane { width: a.width, height: a.height, data: data.collect() }
 }
 
 /// The method whose estimated error is the least.
@@ -62,8 +76,12 @@ pub(super) fn best(input: &Input, alpha: Alpha) -> Solution {
         return uniform(input, Method::L1, alpha);
     }
     let error = |s: &Solution| s.error.as_ref().map_or(f64::INFINITY, |e| e.rel_mse);
-    let tried = [weighted(input, alpha), uniform(input, Method::L2, alpha)];
-    tried.into_iter().min_by(|a, b| error(a).total_cmp(&error(b))).expect("two were tried")
+    let tried = [
+        weighted(input, alpha, Method::Guided),
+        weighted(input, alpha, Method::Weighted),
+        uniform(input, Method::L2, Alpha::Auto),
+    ];
+    tried.into_iter().min_by(|a, b| error(a).total_cmp(&error(b))).expect("three were tried")
 }
 
 /// The primal as it is.

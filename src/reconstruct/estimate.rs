@@ -22,8 +22,9 @@ pub struct ErrorEstimate {
 }
 
 impl ErrorEstimate {
-    /// The estimate for `image` from the images of the halves; pixels that are not finite are left out.
-    pub fn new(image: &Plane, [a, b]: [&Plane; 2]) -> Self {
+    /// The estimate for `image` from the images of the halves, and from the square of a bias where that is known, one a
+    /// pixel. Pixels that are not finite are left out.
+    pub(super) fn new(image: &Plane, [a, b]: [&Plane; 2], bias: Option<&[f32]>) -> Self {
         let columns = image.width.div_ceil(BLOCK);
         let mut sums = vec![(0.0, 0.0); columns * image.height.div_ceil(BLOCK)];
         for (i, value) in image.data.iter().enumerate() {
@@ -31,7 +32,8 @@ impl ErrorEstimate {
             let square = (0..3)
                 .map(|c| (0.5 * (f64::from(a.data[i][c]) - f64::from(b.data[i][c]))).powi(2))
                 .sum::<f64>();
-            let error = square / 3.0 / (grey * grey + EPSILON);
+            let bias = bias.map_or(0.0, |b| f64::from(b[i]));
+            let error = (square / 3.0 + bias) / (grey * grey + EPSILON);
             if error.is_finite() {
                 let sum = &mut sums[i / image.width / BLOCK * columns + i % image.width / BLOCK];
                 *sum = (sum.0 + error, sum.1 + 1.0);

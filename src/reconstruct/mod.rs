@@ -3,7 +3,8 @@
 //! Given the primal estimate g and the differences dx(x, y) = I(x+1, y) − I(x, y), dy(x, y) = I(x, y+1) − I(x, y)
 //! (y down), find x that minimises ‖α (x − g)‖ + ‖Dx x − dx‖ + ‖Dy x − dy‖: squared norms for [`Method::L2`], sums of
 //! the RGB norms of the rows for [`Method::L1`] (Kettunen et al. 2015, "Gradient-domain path tracing"; Lehtinen et
-//! al. 2013 for L1), squared norms with a weight for each row for [`Method::Weighted`]. Borders are natural: the last
+//! al. 2013 for L1), squared norms with a weight for each row for
+//! [`Method::Weighted`] and [`Method::Guided`]. Borders are natural: the last
 //! column of dx and the last row of dy are never read.
 //!
 //! All planes are radiance, W·m⁻²·sr⁻¹, α has no unit. The result may be negative and is not clamped; very direct
@@ -15,10 +16,12 @@
 mod choice;
 mod dct;
 mod estimate;
+mod guided;
 mod l1;
 mod l2;
 mod multigrid;
 mod noise;
+mod regression;
 mod rows;
 #[cfg(test)]
 mod tests;
@@ -64,8 +67,11 @@ pub enum Method {
     /// Sum of squares: linear, hence unbiased; exact by cosine transform.
     L2,
     /// Sum of squares, each row weighed by its measured noise. Without halves: [`Method::L1`].
-    #[default]
     Weighted,
+    /// The weighted image, single pixels mended after their neighbours as far as their noise asks for it: consistent.
+    /// Without features: [`Method::Weighted`].
+    #[default]
+    Guided,
     /// The one of the above with the least estimated error. Without halves: [`Method::L1`].
     Auto,
     /// The primal as it is.
@@ -116,7 +122,7 @@ pub fn reconstruct(input: &Input, method: Method, alpha: Alpha) -> Solution {
     );
     match method {
         Method::L1 | Method::L2 => choice::uniform(input, method, alpha),
-        Method::Weighted => choice::weighted(input, alpha),
+        Method::Weighted | Method::Guided => choice::weighted(input, alpha, method),
         Method::Auto => choice::best(input, alpha),
         Method::None => choice::primal(input),
     }

@@ -95,16 +95,11 @@ impl Variances {
     /// Means over neighbours with Gaussian weights of deviations `sigma_x` and `sigma_y` pixels; known everywhere
     /// but where nothing near is.
     fn smoothed(&self, sigma_x: f32, sigma_y: f32) -> Self {
-        let blur = |v: &[f32]| blur_rows(&blur_columns(v, self.width, sigma_y), self.width, sigma_x);
-        let mut values = blur(&self.values);
-        let ones;
-        let weights = if self.known.is_empty() {
-            ones = vec![1.0; values.len()];
-            blur(&ones)
-        } else {
-            blur(&self.known)
-        };
-        values.par_iter_mut().zip(&weights).for_each(|(v, w)| *v = if *w > 0.0 { *v / w } else { 0.0 });
+        let mut values = smooth(&self.values, self.width, sigma_x, sigma_y);
+        if !self.known.is_empty() {
+            let shares = smooth(&self.known, self.width, sigma_x, sigma_y);
+            values.par_iter_mut().zip(&shares).for_each(|(v, s)| *v = if *s > 0.0 { *v / s } else { 0.0 });
+        }
         Self { width: self.width, values, known: Vec::new() }
     }
 
@@ -130,18 +125,24 @@ fn kernel(sigma: f32) -> Vec<f32> {
     (0..=radius).map(|i| if i == 0 { 1.0 } else { (-0.5 * (i as f32 / sigma).powi(2)).exp() }).collect()
 }
 
-/// Weighted sums down the columns; nothing is outside.
-fn blur_columns(values: &[f32], width: usize, sigma: f32) -> Vec<f32> {
-    let (kernel, mut out) = (kernel(sigma), vec![0.0; values.len()]);
+/// Means over neighbours with Gaussian weights of deviations `sigma_x` and `sigma_y` pixels; nothing is outside.
+pub(super) fn smooth(values: &[f32], width: usize, sigma_x: f32, sigma_y: f32) -> Vec<f32> {
     if values.is_empty() {
-        return out;
+        return Vec::new();
     }
+    smooth_rows(smooth_columns(values, width, &kernel(sigma_y)), width, &kernel(sigma_x))
+}
+
+fn smooth_columns(values: &[f32], width: usize, kernel: &[f32]) -> Vec<f32> {
     let height = values.len() / width;
+    let mut out = vec![0.0; values.len()];
     out.par_chunks_mut(BAND * width).enumerate().for_each(|(band, rows)| {
         for (i, row) in rows.chunks_exact_mut(width).enumerate() {
             let y = band * BAND + i;
-            for other in y.saturating_sub(kernel.len() - 1)..(y + kernel.len()).min(height) {
-                let weight = kernel[y.abs_diff(other)];
+            let near = y.saturating_sub(kernel.len() - 1)..(y + kernel.len()).min(height);
+            let norm = 1.0 / near.clone().map(|other| kernel[y.abs_diff(other)]).sum::<f32>();
+            for other in near {
+                let weight = norm * kernel[y.abs_diff(other)];
                 row.iter_mut().zip(&values[other * width..]).for_each(|(out, v)| *out += weight * v);
             }
         }
@@ -149,18 +150,23 @@ fn blur_columns(values: &[f32], width: usize, sigma: f32) -> Vec<f32> {
     out
 }
 
-/// Weighted sums along the rows; nothing is outside.
-fn blur_rows(values: &[f32], width: usize, sigma: f32) -> Vec<f32> {
-    let (kernel, mut out) = (kernel(sigma), vec![0.0; values.len()]);
-    if values.is_empty() {
-        return out;
+fn smooth_rows(values: Vec<f32>, width: usize, kernel: &[f32]) -> Vec<f32> {
+    if kernel.len() == 1 {
+        return values;
     }
-    out.par_chunks_mut(width).zip(values.par_chunks(width)).for_each(|(out, row)| {
+    let sums = |row: &[f32], out: &mut [f32]| {
         out.iter_mut().zip(row).for_each(|(out, v)| *out = kernel[0] * v);
         for (i, weight) in kernel.iter().enumerate().skip(1).take(width - 1) {
             out.iter_mut().zip(&row[i..]).for_each(|(out, v)| *out += weight * v);
             out[i..].iter_mut().zip(row).for_each(|(out, v)| *out += weight * v);
         }
+    };
+    let mut norm = vec![0.0; width];
+    sums(&vec![1.0; width], &mut norm);
+    let mut out = vec![0.0; values.len()];
+    out.par_chunks_mut(width).zip(values.par_chunks(width)).for_each(|(out, row)| {
+        sums(row, out);
+        out.iter_mut().zip(&norm).for_each(|(out, norm)| *out /= norm);
     });
     out
 }

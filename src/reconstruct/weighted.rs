@@ -30,15 +30,15 @@ pub(super) struct Solver {
 }
 
 impl Solver {
-    /// The solver of the problem whose halves are given.
-    pub fn new(problem: &Problem, halves: &[Measured; 2]) -> Self {
-        let (w, h) = (problem.width, problem.height);
+    /// The solver of the problems of two halves.
+    pub fn new(problems: &[Problem; 2], halves: &[Measured; 2]) -> Self {
+        let (w, h) = (problems[0].width, problems[0].height);
         let noise = Noise::new(halves).smoothed();
         let ((primal, w0), (x, wx), (y, wy)) =
             (noise.primal.weights(), noise.dx.weights(), noise.dy.weights());
         let unit = x.max(y).max(primal);
         let scale = |median: f32| if median > 0.0 { unit / median } else { 1.0 };
-        let keep = |i: usize, bit: u8| problem.mask.is_empty() || problem.mask[i] & bit == 0;
+        let keep = |i: usize, bit: u8| problems.iter().all(|p| p.mask.is_empty() || p.mask[i] & bit == 0);
         let finish = |mut weights: Vec<f32>, median: f32, inside: &(dyn Fn(usize) -> bool + Sync)| {
             weights
                 .par_iter_mut()
@@ -59,7 +59,7 @@ impl Solver {
         Self { multigrid, weights }
     }
 
-    /// The image of `problem`, solved until the residual is `tolerance` of the right-hand side.
+    /// The image of one of the halves.
     pub fn solve(&mut self, problem: &Problem) -> Found {
         let w = problem.width;
         let [_, wx, wy] = &self.weights;

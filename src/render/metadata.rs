@@ -34,6 +34,7 @@ pub fn method_name(method: Method) -> &'static str {
         Method::L1 => "l1",
         Method::L2 => "l2",
         Method::Weighted => "weighted",
+        Method::Guided => "guided",
         Method::Auto => "auto",
         Method::None => "none",
     }

@@ -3,11 +3,11 @@
 //! Root `R, G, B, A`: the image, A = 1. Optional: `Z` (m), `N.X/Y/Z` (world, shading), `P.X/Y/Z` (m, world),
 //! `albedo`, `emission` (very direct light), `variance` (of the mean primal), `spp.Y`. Buffers, enough to solve
 //! again: `primal`, `dx`, `dy`, their halves `_a` and `_b`, and `moments`, the mean squared luminance of the four
-//! one-sided gradients.
+//! one-sided gradients; with them always `albedo`, `N`, `P` and `Z`.
 
 use super::Document;
 use crate::error::{Error, Result};
-use crate::film::{Buffers, Direction, Film, Half, Measured, Plane};
+use crate::film::{Buffers, Direction, Features, Film, Half, Measured, Plane};
 
 /// `Z` where the camera ray meets nothing, m: finite, and beyond any scene.
 pub const FAR: f32 = 1e10;
@@ -105,7 +105,9 @@ fn set_layer(document: &mut Document, film: &Film, layer: Layer) {
 }
 
 fn set_buffers(document: &mut Document, film: &Film) {
-    set_layer(document, film, Layer::Emission);
+    for layer in [Layer::Emission, Layer::Albedo, Layer::N, Layer::P, Layer::Z] {
+        set_layer(document, film, layer);
+    }
     for (half, suffix) in [(Half::Both, ""), (Half::A, "_a"), (Half::B, "_b")] {
         if film.samples(half) == 0 {
             continue;
@@ -138,7 +140,20 @@ pub fn buffers(document: &Document, path: &std::path::Path) -> Result<Buffers> {
         Ok(Measured { primal: primal?, dx: dx?, dy: dy? })
     };
     let halves = measured("_a").and_then(|a| Ok([a, measured("_b")?])).ok();
-    Ok(Buffers { all: measured("")?, halves, direct: plane("emission")?, features: None })
+    Ok(Buffers { all: measured("")?, halves, direct: plane("emission")?, features: features(document) })
+}
+
+/// The features in a document, where all are there. Coverage is not stored: it is 1 where anything was met.
+fn features(document: &Document) -> Option<Features> {
+    let depth = document.channels.get("Z")?;
+    let met = |z: &f32| z.is_finite() && *z < FAR;
+    Some(Features {
+        coverage: depth.iter().map(|z| f32::from(u8::from(met(z)))).collect(),
+        depth: depth.iter().map(|z| if met(z) { *z } else { f32::INFINITY }).collect(),
+        normal: document.layer("N", XYZ)?,
+        position: document.layer("P", XYZ)?,
+        albedo: document.plane("albedo")?,
+    })
 }
 
 #[cfg(test)]
