@@ -6,9 +6,15 @@ use super::rows::Problem;
 use super::weighted::Solver;
 use super::{Alpha, Found, Input, Method, Solution, guided, l1, l2};
 use crate::film::{Measured, Plane};
+use rayon::prelude::*;
 
 /// α where nothing tells a better one.
 const USUAL_ALPHA: f32 = 0.2;
+
+/// Relative residual at which the weighted image is done: its error is then far below the noise.
+const TOLERANCE: f64 = 1e-3;
+/// The same for the image of the noise, of which the size matters and no more.
+const ROUGH: f64 = 3e-2;
 
 fn resolve(alpha: Alpha, input: &Input) -> f32 {
     match alpha {
@@ -49,25 +55,36 @@ pub(super) fn uniform(input: &Input, method: Method, alpha: Alpha) -> Solution {
 /// Weighted or guided; L1 where nothing tells the weights, weighted where nothing guides.
 pub(super) fn weighted(input: &Input, alpha: Alpha, method: Method) -> Solution {
     let Some(halves) = input.halves else { return uniform(input, Method::L1, alpha) };
-    let problems = [Problem::new(&halves[0]), Problem::new(&halves[1])];
+    let difference = half_difference(halves);
+    let problems = [Problem::new(input.all), Problem::new(&difference)];
     let mut solver = Solver::new(&problems, halves);
-    let found = [solver.solve(&problems[0]), solver.solve(&problems[1])];
-    let residual = found[0].residual.max(found[1].residual);
-    let iterations = found[0].iterations.max(found[1].iterations);
-    let mut images = found.map(|f| f.image);
+    let whole = solver.solve(&problems[0], TOLERANCE);
+    let half = solver.solve(&problems[1], ROUGH);
+    let mut images = [1.0, -1.0].map(|sign| combined(&whole.image, &half.image, |x, d| x + sign * d));
     let guide = input.features.filter(|_| method == Method::Guided);
     let bias = guide.map(|features| guided::clean(features, &mut images));
     let [a, b] = &images;
-    let image = mean(a, b);
-    let error = ErrorEstimate::new(&image, [a, b], bias.as_deref());
-    let method = if bias.is_some() { Method::Guided } else { Method::Weighted };
-    let missing = problems[0].missing.max(problems[1].missing);
-    Solution { image, method, alpha: None, residual, iterations, missing, error: Some(error) }
+    let image = if bias.is_some() { combined(a, b, |a, b| 0.5 * (a + b)) } else { whole.image };
+    Solution {
+        error: Some(ErrorEstimate::new(&image, [a, b], bias.as_deref())),
+        image,
+        method: if bias.is_some() { Method::Guided } else { Method::Weighted },
+        alpha: None,
+        residual: whole.residual,
+        iterations: whole.iterations,
+        missing: problems[0].missing,
+    }
 }
 
-fn mean(a: &Plane, b: &Plane) -> Plane {
-    let data = a.data.iter().zip(&b.data).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c])));
+fn combined(a: &Plane, b: &Plane, f: impl Fn(f32, f32) -> f32 + Sync) -> Plane {
+    let data = a.data.par_iter().zip(&b.data).map(|(a, b)| std::array::from_fn(|c| f(a[c], b[c])));
     Plane { width: a.width, height: a.height, data: data.collect() }
+}
+
+/// Half the difference of two halves: the noise of their mean.
+fn half_difference([a, b]: &[Measured; 2]) -> Measured {
+    let half = |a: &Plane, b: &Plane| combined(a, b, |a, b| 0.5 * (a - b));
+    Measured { primal: half(&a.primal, &b.primal), dx: half(&a.dx, &b.dx), dy: half(&a.dy, &b.dy) }
 }
 
 /// The method whose estimated error is the least.

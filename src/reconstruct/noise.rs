@@ -117,7 +117,7 @@ impl Variances {
 }
 
 /// What no variance is below, in medians: where both halves agree by chance, they are not exact.
-const FLOOR: f32 = 1e-3;
+const FLOOR: f32 = 0.2;
 
 /// Gaussian weights of offsets 0 to 3 `sigma`.
 fn kernel(sigma: f32) -> Vec<f32> {

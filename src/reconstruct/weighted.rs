@@ -5,11 +5,11 @@
 //! rendering"). The variances are those of [`super::noise`]; the three channels share their weights.
 //!
 //! The weights know the noise they weigh, but only its square and the neighbours', so the bias is small, and it
-//! vanishes with the noise. Given the weights the image is linear in the planes. The halves are therefore solved with
-//! the weights of the whole: their mean is the image, and half their difference tells its error.
+//! vanishes with the noise. Given the weights the image is linear in the planes: half the difference of the halves,
+//! solved with the weights of the whole, is what the noise of the whole may look like in the image.
 //!
-//! **Stopping rule:** conjugate gradients with a multigrid cycle until the residual of the normal equations is
-//! [`TOLERANCE`] of their right-hand side.
+//! **Stopping rule:** conjugate gradients with a multigrid cycle until the residual of the normal equations is a given
+//! share of their right-hand side.
 
 use super::multigrid::{Multigrid, Weights};
 use super::noise::Noise;
@@ -18,22 +18,24 @@ use super::{Found, l2};
 use crate::film::Measured;
 use rayon::prelude::*;
 
-/// Relative residual at which a solve stops: its error is then far below the noise.
-const TOLERANCE: f64 = 1e-5;
-/// Its limit of steps.
+/// Limit of steps of a solve.
 const MAX_STEPS: usize = 100;
 
 /// The solver for one set of weights.
 pub(super) struct Solver {
     multigrid: Multigrid,
     weights: [Vec<f32>; 3],
+    /// α of the uniform problem whose image is the start.
+    alpha: f32,
 }
 
 impl Solver {
-    /// The solver of the problems of two halves.
+    /// The solver for `problems` of one size, with the weights that the halves tell.
     pub fn new(problems: &[Problem; 2], halves: &[Measured; 2]) -> Self {
         let (w, h) = (problems[0].width, problems[0].height);
-        let noise = Noise::new(halves).smoothed();
+        let noise = Noise::new(halves);
+        let alpha = noise.ratio().unwrap_or(1.0);
+        let noise = noise.smoothed();
         let ((primal, w0), (x, wx), (y, wy)) =
             (noise.primal.weights(), noise.dx.weights(), noise.dy.weights());
         let unit = x.max(y).max(primal);
@@ -56,11 +58,11 @@ impl Solver {
             let planes = [&mut target.w0, &mut target.wx, &mut target.wy];
             planes.into_iter().zip(&weights).for_each(|(to, from)| to.copy_from_slice(from));
         });
-        Self { multigrid, weights }
+        Self { multigrid, weights, alpha }
     }
 
-    /// The image of one of the halves.
-    pub fn solve(&mut self, problem: &Problem) -> Found {
+    /// The image of a problem, until the residual is `tolerance` of the right-hand side.
+    pub fn solve(&mut self, problem: &Problem, tolerance: f64) -> Found {
         let w = problem.width;
         let [_, wx, wy] = &self.weights;
         let weigh = |y: usize, ex: &mut [f32], ey: &mut [f32]| {
@@ -71,9 +73,10 @@ impl Solver {
             }
         };
         let mut r = problem.weighted_divergence::<f32>(1.0, &weigh);
-        let mut correction = vec![0.0; r.len()];
         let scale = l2::norm_square(&r);
-        let enough = scale * TOLERANCE.powi(2);
+        let mut correction = l2::correction::<f32>(problem, self.alpha);
+        self.multigrid.subtract_product(&correction, &mut r);
+        let enough = scale * tolerance.powi(2);
         let (iterations, left) =
             self.multigrid.conjugate_gradients(&mut correction, &mut r, MAX_STEPS, enough);
         let residual = if scale > 0.0 { (left / scale).sqrt() } else { 0.0 };
