@@ -124,7 +124,7 @@ fn shade(c: &mut Criterion) {
             b.iter(|| prepared.lights.seen_from(&prepared, black_box(&point), p));
         });
         group.bench_function(format!("environment/{name}"), |b| {
-            b.iter(|| (prepared.lights.environment(black_box(wi)), prepared.lights.environment_pdf(wi)));
+            b.iter(|| prepared.lights.environment_with_pdf(black_box(wi)));
         });
     }
     group.finish();

@@ -8,12 +8,12 @@
 use super::block::{Block, Primary, neighbours};
 use super::head::{Head, Offset, Walk};
 use super::path::write_primary;
-use super::wave::Region;
+use super::wave::{Region, Scratch};
 use super::{Integrator, ShiftOutcome, Statistics, View};
 use crate::accel::Accel;
 use crate::film::{Direction, FilmTile, PixelSample};
-use crate::math::{Mask, Permute, Rgb, f32x16, splat};
-use crate::path::tail::{self, Queues, Slot};
+use crate::math::{Mask, Permute, Pick, Rgb, Vec3x, f32x16, splat};
+use crate::path::tail::{self, Slot};
 use crate::path::trace::Tracer;
 use crate::shade::Surface;
 
@@ -29,7 +29,8 @@ fn first_offsets(block: &Block, region: &Region, primary: &Primary, ring: &Prima
         let met = Mask::from_fn(|i| hit[from[i] / 16].get(from[i] % 16));
         let own = exists & met & primary.hits.valid;
         Offset {
-            surface: <Surface as Permute>::permute(&primary.surface, &ring.surface, &from),
+            surface: <Surface as Permute>::permute(&primary.surface, &ring.surface, Pick::new(from)),
+            wo: Vec3x::ZERO,
             beta: own.keep(Rgb::grey(1.0)),
             ratio: own.keep(splat(1.0)),
             own,
@@ -67,19 +68,17 @@ impl Integrator for GradientPath {
         region: &Region,
         wave: std::ops::Range<u32>,
         tile: &mut FilmTile,
+        scratch: &mut Scratch,
         statistics: &mut Statistics,
     ) {
-        let mut slots = region.slots(view.settings.seed, &wave);
-        let mut samples = vec![PixelSample::default(); slots.len()];
-        let mut factors = vec![[[0.0_f32; 3]; 4]; slots.len()];
-        let mut queues = Queues::default();
+        let Scratch { slots, samples, factors, queues } = scratch.reset(region, &wave);
         for block in Block::of_region(region, view.settings.seed) {
             let ring_inside = block.ring_inside(region);
             for index in wave.clone() {
                 let primary = block.primary(view, tracer, index);
                 let lanes = block.slots(region, index - wave.start);
                 let direct = primary.direct(tracer);
-                write_primary(&mut samples, &lanes, &block, &primary, direct);
+                write_primary(samples, &lanes, &block, &primary, direct);
                 if primary.hits.valid.none() || view.limits.max_depth < 2 {
                     continue;
                 }
@@ -99,15 +98,15 @@ impl Integrator for GradientPath {
                 let missed = offsets.iter().map(|o| (o.exists & primary.hits.valid).and_not(o.own).count());
                 head.outcomes[ShiftOutcome::NoPrimaryHit as usize] = missed.map(u64::from).sum();
                 let walk = Walk { view, streams: block.streams(index), slots: lanes };
-                head.walk(tracer, &walk, &mut queues);
-                write_head(&head, &block, &lanes, &mut samples, &mut slots, &mut factors);
+                head.walk(tracer, &walk, queues);
+                write_head(&head, &block, &lanes, samples, slots, factors);
                 for (sum, count) in statistics.shifts.iter_mut().zip(head.outcomes) {
                     *sum += count;
                 }
             }
         }
-        tail::run(tracer, &mut queues, &mut slots, &view.limits);
-        for ((sample, slot), factors) in samples.iter_mut().zip(&slots).zip(&factors) {
+        tail::run(tracer, queues, slots, &view.limits);
+        for ((sample, slot), factors) in samples.iter_mut().zip(slots.iter()).zip(factors.iter()) {
             sample.primal = slot.radiance;
             for (gradient, factor) in sample.gradient.iter_mut().zip(factors) {
                 for c in 0..3 {
@@ -115,6 +114,6 @@ impl Integrator for GradientPath {
                 }
             }
         }
-        region.develop(&wave, &samples, tile);
+        region.develop(&wave, samples, tile);
     }
 }

@@ -10,9 +10,10 @@ use super::{ShiftOutcome, View};
 use crate::accel::{Accel, Coherence, Rays};
 use crate::math::{Compare, Mask, Rgb, Vec3x, f32x16, splat};
 use crate::path::bounce::{Bounce, absorption, bounce, light_pdf};
-use crate::path::direct::{self, DirectLight};
+use crate::path::direct::{self, DirectLight, Lit};
 use crate::path::shift::{PairWeights, half_vector, is_diffuse, plan, reconnect};
-use crate::path::tail::{Arrival, Queues, emission_weight};
+use crate::path::queue::{Arrival, Queues};
+use crate::path::tail::emission_weight;
 use crate::path::trace::Tracer;
 use crate::path::{Limits, Streams};
 use crate::shade::Surface;
@@ -20,8 +21,10 @@ use crate::shade::Surface;
 /// One offset path a lane.
 #[derive(Clone, Copy, Default)]
 pub struct Offset {
-    /// Its own vertex y_k, or once recently connected the base's vertex seen from y_{k−1}.
+    /// Its own vertex y_k.
     pub surface: Surface,
+    /// Once recently connected: direction from the base's vertex back to y_{k−1}.
+    pub wo: Vec3x,
     /// J f_y / p_x.
     pub beta: Rgb,
     /// r = J p_y / p_x.
@@ -53,7 +56,7 @@ struct Next {
 
 /// The offset after one bounce, before it is written back.
 struct Shifted {
-    surface: Surface,
+    wo: Vec3x,
     beta: Rgb,
     ratio: f32x16,
     own: Mask,
@@ -150,7 +153,8 @@ impl Head {
             let r2 = offset.ratio * offset.ratio;
             let mut offset_weight = offset.connected.keep(r2 * base_weight);
             if evaluated.any() {
-                let (seen, pdf_ratio) = offset_light(tracer, offset, &light, evaluated, coherence);
+                let (seen, pdf_ratio) =
+                    offset_light(tracer, &self.surface, offset, &light, evaluated, coherence);
                 radiance = evaluated.select(seen, radiance);
                 // J ℓ_y / ℓ_x is 1: base and offset use the same point. Occlusion zeroes f and b, never ℓ.
                 offset_weight = evaluated.select(r2 * (splat(1.0) + pdf_ratio * pdf_ratio), offset_weight);
@@ -201,7 +205,7 @@ impl Head {
             let alive = offset.own | offset.recent | offset.connected;
             offset.beta = alive.keep(shifted.beta);
             offset.ratio = alive.keep(shifted.ratio);
-            offset.surface = shifted.surface;
+            offset.wo = shifted.wo;
         }
         self.beta = beta;
         self.surface = next.vertex;
@@ -224,13 +228,18 @@ impl Head {
             *factor = settled.select(value, *factor);
         }
         let arrival = Arrival {
+            slots: walk.slots,
+            streams: walk.streams,
+            hits: step.hits,
             wo: -step.sample.wi,
             beta: self.beta,
+            radiance: self.radiance,
             tau: Rgb::grey(1.0),
+            tail: Rgb::ZERO,
             eta_squared: self.eta_squared,
             bsdf_pdf: splat(-1.0),
         };
-        queues.push_lanes(depth, settled, &walk.slots, &step.hits, &arrival);
+        queues.push(depth, settled, &arrival);
         self.active = self.active.and_not(settled);
     }
 
@@ -248,7 +257,7 @@ impl Head {
         let r2 = offset.ratio * offset.ratio;
         // Connected: everything is the base's.
         let mut out = Shifted {
-            surface: offset.surface,
+            wo: offset.wo,
             beta: offset.connected.keep(offset.beta * step.factor()),
             ratio: offset.connected.keep(offset.ratio),
             own: Mask::NONE,
@@ -290,7 +299,7 @@ impl Head {
     /// Recently connected: only the direction to the previous vertex differs; J = 1.
     fn shift_recent(&self, step: &Bounce, next: &Next, d: usize, lanes: Mask, out: &mut Shifted) {
         let offset = &self.offsets[d];
-        let (f, pdf) = offset.surface.bsdf.eval(offset.surface.wo, step.sample.wi);
+        let (f, pdf) = self.surface.bsdf.eval(offset.wo, step.sample.wi);
         // A Dirac event of the base has no counterpart for another incoming direction.
         let smooth = !step.sample.dirac;
         let f = smooth.keep(f * absorption(&self.surface, step.sample.wi, &step.hits));
@@ -342,9 +351,7 @@ impl Head {
         let radiance = sky.select(next.radiance, next.vertex.emission_towards(-wi));
         out.radiance = lanes.select(radiance, out.radiance);
         out.recent = visible & step.hits.valid;
-        let mut seen_from_here = next.vertex;
-        seen_from_here.wo = -wi;
-        out.surface = out.recent.select(seen_from_here, out.surface);
+        out.wo = out.recent.select(-wi, out.wo);
         self.count(ShiftOutcome::Reconnected, visible);
         self.count(ShiftOutcome::Occluded, scatters.and_not(visible));
         self.count(ShiftOutcome::ZeroBsdf, lanes.and_not(scatters));
@@ -394,7 +401,8 @@ impl Head {
         let radiance = sky.select(behind, (valid & vertex.is_emitter).keep(vertex.emission));
         out.radiance = lanes.select(radiance, out.radiance);
         out.own = valid & hits.valid;
-        out.surface = out.own.select(vertex, out.surface);
+        let offset = &mut self.offsets[d];
+        offset.surface = out.own.select(vertex, offset.surface);
         self.count(ShiftOutcome::HalfVector, valid);
         self.count(ShiftOutcome::HalfVectorDomain, lanes.and_not(exists));
         self.count(ShiftOutcome::HalfVectorMismatch, exists.and_not(valid));
@@ -404,22 +412,35 @@ impl Head {
 /// The offset's side of an NEE event: radiance per unit throughput, and b_y J / ℓ_x.
 fn offset_light<A: Accel>(
     tracer: &mut Tracer<'_, A>,
+    base: &Surface,
     offset: &Offset,
     light: &DirectLight,
     evaluated: Mask,
     coherence: Coherence,
 ) -> (Rgb, f32x16) {
-    let mut lit = direct::look(tracer, &offset.surface, &light.point, evaluated);
-    // A recently connected offset shares the base's segment; that was traced unless the base's BSDF is zero there.
-    let shared = offset.recent.and_not(light.base.f.is_zero());
-    let mut traced = lit;
-    traced.visible = lit.visible.and_not(shared);
-    let base_is_lit = !light.base.contribution(&light.point).is_zero();
-    direct::shadow(tracer, &offset.surface, &mut traced, &light.segment, base_is_lit, coherence);
-    let visible = shared.select(lit.visible & light.base.visible, traced.visible);
-    lit.visible = visible;
-    lit.bsdf_pdf = visible.keep(lit.bsdf_pdf);
-    (lit.contribution(&light.point), lit.pdf_ratio(&light.point))
+    let point = &light.point;
+    let base_is_lit = !light.base.contribution(point).is_zero();
+    let mut lit = Lit::default();
+    let recent = evaluated & offset.recent;
+    if recent.any() {
+        lit = direct::scatter(base, offset.wo, point, light.base.seen, recent);
+        // The base's segment is shared; it was traced unless the base's BSDF is zero there.
+        let untraced = recent & light.base.f.is_zero();
+        let mut traced = lit;
+        if untraced.any() {
+            traced.visible = traced.visible & untraced;
+            direct::shadow(tracer, base, &mut traced, &light.segment, base_is_lit, coherence);
+        }
+        lit.visible = untraced.select(traced.visible, lit.visible & light.base.visible);
+        lit.bsdf_pdf = lit.visible.keep(lit.bsdf_pdf);
+    }
+    let own = evaluated & offset.own;
+    if own.any() {
+        let mut seen = direct::look(tracer, &offset.surface, point, own);
+        direct::shadow(tracer, &offset.surface, &mut seen, &light.segment, base_is_lit, coherence);
+        lit = own.select(seen, lit);
+    }
+    (lit.contribution(point), lit.pdf_ratio(point))
 }
 
 /// Evaluates `f` only where some lane needs it.
@@ -434,8 +455,7 @@ fn arrive<A: Accel>(tracer: &Tracer<'_, A>, walk: &Walk<'_>, step: &Bounce) -> N
     let lights = &tracer.scene.lights;
     let vertex = Surface::new(tracer.scene, &step.hits, step.active & step.hits.valid, -wi);
     let sky = if lights.has_environment() { step.escaped() } else { Mask::NONE };
-    let environment = if_any(sky, || lights.environment(wi));
-    let environment_pdf = if_any(sky, || lights.environment_pdf(wi));
+    let (environment, environment_pdf) = if_any(sky, || lights.environment_with_pdf(wi));
     let radiance = sky.select(environment, (step.hits.valid & vertex.is_emitter).keep(vertex.emission));
     let surface_pdf = step.hits.valid.keep(light_pdf(&vertex, wi, step.hits.t));
     let light_pdf = sky.select(environment_pdf, surface_pdf);

@@ -12,7 +12,7 @@ mod wave;
 
 pub use gradient_path::GradientPath;
 pub use path::Path;
-pub use wave::{Region, TILE};
+pub use wave::{Region, Scratch, TILE};
 
 use crate::accel::Accel;
 use crate::film::{Film, FilmTile};
@@ -164,6 +164,7 @@ pub trait Integrator: Sync {
         region: &Region,
         wave: std::ops::Range<u32>,
         tile: &mut FilmTile,
+        scratch: &mut Scratch,
         statistics: &mut Statistics,
     );
 }
@@ -220,7 +221,7 @@ fn tiles<I: Integrator, A: Accel>(
     for batch in regions.chunks(BATCH) {
         let finished: Vec<_> = batch
             .par_iter()
-            .map(|region| {
+            .map_init(Scratch::default, |scratch, region| {
                 if cancel.load(Ordering::Relaxed) {
                     return None;
                 }
@@ -231,7 +232,7 @@ fn tiles<I: Integrator, A: Accel>(
                     if cancel.load(Ordering::Relaxed) {
                         return None;
                     }
-                    integrator.wave(view, &mut tracer, region, wave, &mut tile, &mut statistics);
+                    integrator.wave(view, &mut tracer, region, wave, &mut tile, scratch, &mut statistics);
                 }
                 statistics.rays = tracer.counts;
                 on_progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);

@@ -1,25 +1,32 @@
 //! Path tracing: primary hits block by block, then the tail of [`crate::path::tail`] for everything else.
 
-use super::block::Block;
-use super::wave::Region;
+use super::block::{Block, Primary};
+use super::wave::{Region, Scratch};
 use super::{Integrator, Statistics, View};
 use crate::accel::Accel;
 use crate::film::{FilmTile, PixelSample};
-use crate::math::{Rgb, f32x16, splat};
-use crate::path::tail::{self, Arrival, Queues};
+use crate::math::{LANES, Rgb, splat};
+use crate::path::Streams;
+use crate::path::queue::Arrival;
+use crate::path::tail;
 use crate::path::trace::Tracer;
 
 /// The path tracer.
 pub struct Path;
 
-/// An arrival at the first surface, whose emission is very direct light and not part of the path.
-pub fn first_arrival(wo: crate::math::Vec3x) -> Arrival {
+/// Arrivals at the first surface, whose emission is very direct light and not part of the path.
+fn first_arrival(slots: [u32; LANES], streams: Streams, primary: &Primary) -> Arrival {
     Arrival {
-        wo,
+        slots,
+        streams,
+        hits: primary.hits,
+        wo: -primary.direction,
         beta: Rgb::grey(1.0),
+        radiance: Rgb::ZERO,
         tau: Rgb::grey(1.0),
+        tail: Rgb::ZERO,
         eta_squared: splat(1.0),
-        bsdf_pdf: f32x16::splat(-1.0),
+        bsdf_pdf: splat(-1.0),
     }
 }
 
@@ -28,7 +35,7 @@ pub fn write_primary(
     samples: &mut [PixelSample],
     slots: &[u32],
     block: &Block,
-    primary: &super::block::Primary,
+    primary: &Primary,
     direct: Rgb,
 ) {
     for i in block.inside.iter() {
@@ -55,27 +62,26 @@ impl Integrator for Path {
         region: &Region,
         wave: std::ops::Range<u32>,
         tile: &mut FilmTile,
+        scratch: &mut Scratch,
         _statistics: &mut Statistics,
     ) {
-        let mut slots = region.slots(view.settings.seed, &wave);
-        let mut samples = vec![PixelSample::default(); slots.len()];
-        let mut queues = Queues::default();
+        let Scratch { slots, samples, queues, .. } = scratch.reset(region, &wave);
         for block in Block::of_region(region, view.settings.seed) {
             for index in wave.clone() {
                 let primary = block.primary(view, tracer, index);
                 let lanes = block.slots(region, index - wave.start);
                 let direct = primary.direct(tracer);
-                write_primary(&mut samples, &lanes, &block, &primary, direct);
+                write_primary(samples, &lanes, &block, &primary, direct);
                 if view.limits.max_depth > 1 {
-                    let arrival = first_arrival(-primary.direction);
-                    queues.push_lanes(1, primary.hits.valid, &lanes, &primary.hits, &arrival);
+                    let arrival = first_arrival(lanes, block.streams(index), &primary);
+                    queues.push(1, primary.hits.valid, &arrival);
                 }
             }
         }
-        tail::run(tracer, &mut queues, &mut slots, &view.limits);
-        for (sample, slot) in samples.iter_mut().zip(&slots) {
+        tail::run(tracer, queues, slots, &view.limits);
+        for (sample, slot) in samples.iter_mut().zip(slots.iter()) {
             sample.primal = slot.radiance;
         }
-        region.develop(&wave, &samples, tile);
+        region.develop(&wave, samples, tile);
     }
 }

@@ -1,7 +1,7 @@
 //! Waves: the paths of one tile for a few samples a pixel, in flight together so that packets stay full at depth.
 
 use crate::film::{FilmTile, PixelSample};
-use crate::math::sampler::Stream;
+use crate::path::queue::Queues;
 use crate::path::tail::Slot;
 
 /// Side of a tile in pixels; a multiple of the block's side.
@@ -14,6 +14,34 @@ const WAVE: u32 = 8;
 pub fn waves(first: u32, spp: u32) -> impl Iterator<Item = std::ops::Range<u32>> {
     let end = first + spp;
     (first..end).step_by(WAVE as usize).map(move |start| start..(start + WAVE).min(end))
+}
+
+/// Memory of a wave, kept from one to the next: fresh pages cost more than the work on them.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    /// What the tails gather, by slot.
+    pub slots: Vec<Slot>,
+    /// The samples, by slot.
+    pub samples: Vec<PixelSample>,
+    /// What T is multiplied with for the gradients, by slot and direction.
+    pub factors: Vec<[[f32; 3]; 4]>,
+    /// Waiting paths.
+    pub queues: Queues,
+}
+
+impl Scratch {
+    /// Empty slots and samples for a wave; no path waits.
+    pub fn reset(&mut self, region: &Region, wave: &std::ops::Range<u32>) -> &mut Self {
+        let pixels = (region.x1 - region.x0) * (region.y1 - region.y0);
+        let count = (pixels * (wave.end - wave.start)) as usize;
+        self.slots.clear();
+        self.slots.resize(count, Slot::default());
+        self.samples.clear();
+        self.samples.resize(count, PixelSample::default());
+        self.factors.clear();
+        self.factors.resize(count, [[0.0; 3]; 4]);
+        self
+    }
 }
 
 /// The pixels of one tile, in coordinates of the whole film; a tile of the film's grid cut to the part that is
@@ -75,20 +103,6 @@ impl Region {
     pub fn slot(&self, x: u32, y: u32, wave_index: u32) -> u32 {
         let (width, height) = (self.x1 - self.x0, self.y1 - self.y0);
         wave_index * width * height + (y - self.y0) * width + (x - self.x0)
-    }
-
-    /// Slots for a wave, streams set.
-    pub fn slots(&self, seed: u64, wave: &std::ops::Range<u32>) -> Vec<Slot> {
-        let mut slots = Vec::new();
-        for index in wave.clone() {
-            for y in self.y0..self.y1 {
-                for x in self.x0..self.x1 {
-                    let seed = Stream::Pixel(x, y).seed(seed);
-                    slots.push(Slot { seed, index, ..Slot::default() });
-                }
-            }
-        }
-        slots
     }
 
     /// Adds the finished samples of a wave to the tile, in the order of their indices.

@@ -2,7 +2,8 @@
 
 pub mod alias;
 pub mod sampler;
+pub mod transpose;
 pub mod warp;
 pub mod wide;
 
-pub use self::wide::{Compare, Frame, LANES, Mask, Permute, Rgb, Select, Vec3x, f32x16, lanes, splat};
+pub use self::wide::{Compare, Frame, LANES, Mask, Permute, Pick, Rgb, Select, Vec3x, f32x16, lanes, splat};

@@ -5,7 +5,7 @@
 //! dimensions; every stream (pixel or block) scrambles with a seed of its own. Sixteen lanes at a time, the numbers
 //! are those of the crate `sobol_burley`, which works on one.
 
-use super::{LANES, f32x16, lanes};
+use super::{LANES, f32x16};
 use wide::u32x16;
 
 /// Mixes two words into one (two rounds of Wellons' "lowbias32").
@@ -131,6 +131,15 @@ fn sobol_hash(x: u32x16) -> u32x16 {
     lowbias(x ^ u32x16::splat(0xe6fe_3beb))
 }
 
+/// One dimension: scrambled, as floats in [0, 1).
+#[inline(always)]
+fn finish(point: u32x16, seed: u32x16, salt: u32) -> f32x16 {
+    let scramble = sobol_hash(seed ^ u32x16::splat(salt));
+    let word = reverse_bits(owen_scramble_reversed(point, scramble));
+    let one_to_two: f32x16 = bytemuck::cast((word >> 9_u32) | u32x16::splat(0x3f80_0000));
+    one_to_two - f32x16::ONE
+}
+
 /// [`sample_4d`] for sixteen lanes, each with its own stream and sample index.
 #[inline]
 pub fn sample_4d_wide(stream_seeds: &[u32; LANES], indices: &[u32; LANES], set: u32) -> [f32x16; 4] {
@@ -153,11 +162,15 @@ pub fn sample_4d_wide(stream_seeds: &[u32; LANES], indices: &[u32; LANES], set: 
 
     const SALTS: [u32; 4] = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8];
     let seed = seed * u32x16::splat(0x9c8f_2d3b);
-    std::array::from_fn(|d| {
-        let scramble = sobol_hash(seed ^ u32x16::splat(SALTS[d]));
-        let word = reverse_bits(owen_scramble_reversed(points[d], scramble)).to_array();
-        lanes(|i| f32::from_bits((word[i] >> 9) | 0x3f80_0000) - 1.0)
-    })
+    // Written out, so that the four chains of multiplications overlap.
+    let [a, b, c, d] = points;
+    let [salt_a, salt_b, salt_c, salt_d] = SALTS;
+    [
+        finish(a, seed, salt_a),
+        finish(b, seed, salt_b),
+        finish(c, seed, salt_c),
+        finish(d, seed, salt_d),
+    ]
 }
 
 #[cfg(test)]

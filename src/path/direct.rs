@@ -7,11 +7,11 @@
 use super::Streams;
 use super::trace::{Segment, SegmentKind, Tracer};
 use crate::accel::{Accel, Coherence, Rays};
-use crate::math::{Compare, Mask, Rgb, f32x16, splat};
+use crate::math::{Compare, Mask, Rgb, Vec3x, f32x16, splat};
 use crate::shade::{LightPoint, LightSeen, Surface};
 
 /// A light point as one vertex sees it, with the BSDF towards it.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct Lit {
     /// The light from here.
     pub seen: LightSeen,
@@ -52,10 +52,16 @@ impl Lit {
 }
 
 /// Looks at `point` from `surface`; visibility is still open (assumed free).
-#[inline]
+#[inline(always)]
 pub fn look<A: Accel>(tracer: &Tracer<'_, A>, surface: &Surface, point: &LightPoint, active: Mask) -> Lit {
     let seen = tracer.scene.lights.seen_from(tracer.scene, point, surface.p);
-    let (f, pdf) = surface.bsdf.eval(surface.wo, seen.wi);
+    scatter(surface, surface.wo, point, seen, active)
+}
+
+/// What `surface` scatters of `point`, as seen from it, towards `wo`; visibility is still open.
+#[inline(always)]
+pub fn scatter(surface: &Surface, wo: Vec3x, point: &LightPoint, seen: LightSeen, active: Mask) -> Lit {
+    let (f, pdf) = surface.bsdf.eval(wo, seen.wi);
     let active = active & seen.geometry.gt(f32x16::ZERO);
     let f = active.keep(f * surface.bsdf.transmittance(seen.wi, seen.distance));
     Lit { seen, f, bsdf_pdf: active.and_not(point.is_dirac).keep(pdf), visible: active }
@@ -119,3 +125,5 @@ impl DirectLight {
         self.base.visible.keep(self.base.contribution(&self.point) * weight)
     }
 }
+
+crate::lanewise!(Lit { seen, f, bsdf_pdf, visible });

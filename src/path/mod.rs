@@ -5,6 +5,7 @@
 
 pub mod bounce;
 pub mod direct;
+pub mod queue;
 pub mod shift;
 #[cfg(test)]
 mod shift_tests;

@@ -8,7 +8,7 @@
 use super::Streams;
 use crate::accel::{Accel, Coherence, Hits, Rays, Visible};
 use crate::math::sampler::hash;
-use crate::math::{Compare, LANES, Mask, Vec3x, f32x16, splat};
+use crate::math::{Compare, Mask, Vec3x, f32x16, splat};
 use crate::shade::{ShadeScene, alpha};
 
 /// How much was traced.
@@ -38,7 +38,10 @@ impl RayCounts {
 
 /// The coverage thresholds of one segment of sixteen paths.
 #[derive(Clone, Copy, Debug)]
-pub struct Segment([u32; LANES]);
+pub struct Segment {
+    streams: Streams,
+    salt: u32,
+}
 
 /// What a segment is for: its thresholds are independent of those of the other kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,14 +56,14 @@ impl Segment {
     /// The segment of `kind` that starts at vertex `depth`.
     #[inline]
     pub fn new(streams: &Streams, depth: u32, kind: SegmentKind) -> Self {
-        let salt = 0x8000_0000 | depth << 1 | u32::from(kind == SegmentKind::Light);
-        Self(std::array::from_fn(|i| hash(hash(streams.seeds[i], streams.indices[i]), salt)))
+        Self { streams: *streams, salt: 0x8000_0000 | depth << 1 | u32::from(kind == SegmentKind::Light) }
     }
 
     /// Threshold in [0, 1) of a triangle.
     #[inline]
     fn threshold(&self, lane: usize, instance: u32, primitive: u32) -> f32 {
-        (hash(hash(self.0[lane], instance), primitive) >> 8) as f32 / (1 << 24) as f32
+        let sample = hash(self.streams.seeds[lane], self.streams.indices[lane]);
+        (hash(hash(hash(sample, self.salt), instance), primitive) >> 8) as f32 / (1 << 24) as f32
     }
 }
 

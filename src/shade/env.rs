@@ -22,6 +22,9 @@ pub struct EnvironmentTable {
     rows: Vec<f32>,
     /// Cumulative probability of the columns of each row, `width + 1` entries a row.
     columns: Vec<f32>,
+    /// Where to begin the search in `rows`, `height` entries, and in each row of `columns`, `width` entries a row.
+    row_guide: Vec<u32>,
+    column_guide: Vec<u32>,
 }
 
 /// Luminance, Rec.709.
@@ -44,11 +47,32 @@ fn push_cumulative(out: &mut Vec<f32>, weights: &[f64]) -> f64 {
     sum
 }
 
+/// For each k of n the interval of a cumulative distribution of n intervals that holds k / n: from there a search
+/// takes less than two steps on average (Chen and Asau 1974, "On Generating Random Variates from an Empirical
+/// Distribution").
+fn push_guide(out: &mut Vec<u32>, cumulative: &[f32]) {
+    let n = cumulative.len() - 1;
+    let mut i = 0;
+    for k in 0..n {
+        while i + 1 < n && cumulative[i + 1] <= k as f32 / n as f32 {
+            i += 1;
+        }
+        out.push(i as u32);
+    }
+}
+
 /// The interval of a cumulative distribution that holds `u` in [0, 1), and where in it, in [0, 1).
 #[inline(always)]
-fn invert(cumulative: &[f32], u: f32) -> (usize, f32) {
-    let n = cumulative.len() - 1;
-    let i = cumulative[1..n].partition_point(|&c| c <= u);
+fn invert(cumulative: &[f32], guide: &[u32], u: f32) -> (usize, f32) {
+    let n = guide.len();
+    let mut i = guide[((u * n as f32) as usize).min(n - 1)] as usize;
+    // The product may have been rounded up to the next bin of the guide.
+    while i > 0 && cumulative[i] > u {
+        i -= 1;
+    }
+    while i + 1 < n && cumulative[i + 1] <= u {
+        i += 1;
+    }
     let (low, high) = (cumulative[i], cumulative[i + 1]);
     let inside = if high > low { (u - low) / (high - low) } else { 0.5 };
     const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
@@ -86,8 +110,12 @@ impl EnvironmentTable {
         if push_cumulative(&mut rows, &row_weights) <= 0.0 {
             return None;
         }
+        let (mut row_guide, mut column_guide) = (Vec::new(), Vec::with_capacity(width * height));
+        push_guide(&mut row_guide, &rows);
+        columns.chunks_exact(width + 1).for_each(|row| push_guide(&mut column_guide, row));
         let (sin_rotation, cos_rotation) = environment.rotation.sin_cos();
-        Some(Self { width, height, texels: texels.clone(), sin_rotation, cos_rotation, rows, columns })
+        let texels = texels.clone();
+        Some(Self { width, height, texels, sin_rotation, cos_rotation, rows, columns, row_guide, column_guide })
     }
 
     /// Texture coordinates of a direction: u in [0, 1], v in [0, 1], and sin θ.
@@ -105,21 +133,26 @@ impl EnvironmentTable {
     /// Radiance from the directions `d`.
     pub fn radiance(&self, d: Vec3x) -> Rgb {
         let (u, v, _) = self.to_uv(d);
+        self.radiance_at(u, v)
+    }
+
+    /// Radiance at texture coordinates in [0, 1].
+    #[inline(always)]
+    fn radiance_at(&self, u: f32x16, v: f32x16) -> Rgb {
         let x = u * splat(self.width as f32) - splat(0.5);
         let y = v * splat(self.height as f32) - splat(0.5);
         let (left, top) = (x.floor(), y.floor());
         let (fx, fy) = ((x - left).to_array(), (y - top).to_array());
         let (left, top) = (left.to_array(), top.to_array());
-        let (w, h) = (self.width as i64, self.height as i64);
+        let (last_column, last_row) = (self.width - 1, self.height - 1);
         Rgb::lanes(|i| {
-            // A cast from a NaN, of an inactive lane, gives 0.
-            let (column, row) = (left[i] as i64, top[i] as i64);
-            let texel = |column: i64, row: i64| {
-                self.texels[row.clamp(0, h - 1) as usize * self.width + column.rem_euclid(w) as usize]
-            };
-            let upper = texel(column, row).lerp(texel(column + 1, row), fx[i]);
-            let lower = texel(column, row + 1).lerp(texel(column + 1, row + 1), fx[i]);
-            upper.lerp(lower, fy[i])
+            // From −1 on. A cast from a NaN, of an inactive lane, gives 0.
+            let (column, row) = (left[i] as i32, top[i] as i32);
+            let (x0, x1) = (if column < 0 { last_column } else { column as usize }, (column + 1) as usize);
+            let (x0, x1) = (x0.min(last_column), if x1 > last_column { 0 } else { x1 });
+            let (y0, y1) = ((row.max(0) as usize).min(last_row), ((row + 1) as usize).min(last_row));
+            let (upper, lower) = (&self.texels[y0 * self.width..], &self.texels[y1 * self.width..]);
+            upper[x0].lerp(upper[x1], fx[i]).lerp(lower[x0].lerp(lower[x1], fx[i]), fy[i])
         })
     }
 
@@ -132,9 +165,15 @@ impl EnvironmentTable {
         p_row * self.height as f32 * (p_column * self.width as f32)
     }
 
-    /// pdf in solid angle with which [`Self::sample`] finds `d`, sr⁻¹.
-    pub fn pdf(&self, d: Vec3x) -> f32x16 {
+    /// Radiance from the directions `d`, and the pdf with which [`Self::sample`] finds them, sr⁻¹.
+    pub fn radiance_and_pdf(&self, d: Vec3x) -> (Rgb, f32x16) {
         let (u, v, sin) = self.to_uv(d);
+        (self.radiance_at(u, v), self.pdf_at(u, v, sin))
+    }
+
+    /// pdf in solid angle, sr⁻¹, at texture coordinates where sin θ is `sin`.
+    #[inline(always)]
+    fn pdf_at(&self, u: f32x16, v: f32x16, sin: f32x16) -> f32x16 {
         let column = (u * splat(self.width as f32)).to_array();
         let row = (v * splat(self.height as f32)).to_array();
         let density = f32x16::new(std::array::from_fn(|i| {
@@ -144,24 +183,26 @@ impl EnvironmentTable {
         sin.gt(f32x16::ZERO).select(density / (splat(2.0 * PI * PI) * sin), f32x16::ZERO)
     }
 
-    /// Directions by importance, and their pdf in solid angle, sr⁻¹.
-    pub fn sample(&self, u: f32x16, v: f32x16) -> (Vec3x, f32x16) {
+    /// Directions by importance, their pdf in solid angle, sr⁻¹, and the radiance from there.
+    pub fn sample(&self, u: f32x16, v: f32x16) -> (Vec3x, f32x16, Rgb) {
         let (us, vs) = (u.to_array(), v.to_array());
-        let (mut phi, mut theta, mut density) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (mut tu, mut tv, mut density) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
-            let (row, y) = invert(&self.rows, vs[i]);
-            let stride = self.width + 1;
-            let (column, x) = invert(&self.columns[row * stride..(row + 1) * stride], us[i]);
-            phi[i] = 2.0 * PI * ((column as f32 + x) / self.width as f32);
-            theta[i] = PI * ((row as f32 + y) / self.height as f32);
+            let (row, y) = invert(&self.rows, &self.row_guide, vs[i]);
+            let (w, stride) = (self.width, self.width + 1);
+            let columns = &self.columns[row * stride..(row + 1) * stride];
+            let (column, x) = invert(columns, &self.column_guide[row * w..(row + 1) * w], us[i]);
+            tu[i] = (column as f32 + x) / w as f32;
+            tv[i] = (row as f32 + y) / self.height as f32;
             density[i] = self.texel_density(row, column);
         }
-        let (sin_phi, cos_phi) = f32x16::new(phi).sin_cos();
-        let (sin, cos) = f32x16::new(theta).sin_cos();
+        let (tu, tv) = (f32x16::new(tu), f32x16::new(tv));
+        let (sin_phi, cos_phi) = (tu * splat(2.0 * PI)).sin_cos();
+        let (sin, cos) = (tv * splat(PI)).sin_cos();
         let (x, z) = (sin * sin_phi, -sin * cos_phi);
         let (s, c) = (splat(self.sin_rotation), splat(self.cos_rotation));
         let d = Vec3x::new(x.mul_add(c, z * s), cos, z.mul_sub(c, x * s));
         let pdf = f32x16::new(density) / (splat(2.0 * PI * PI) * sin);
-        (d, sin.gt(f32x16::ZERO).select(pdf, f32x16::ZERO))
+        (d, sin.gt(f32x16::ZERO).select(pdf, f32x16::ZERO), self.radiance_at(tu, tv))
     }
 }

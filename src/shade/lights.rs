@@ -6,7 +6,7 @@
 //! density at the receiver, pdf / geometry.
 
 use super::env::EnvironmentTable;
-use super::surface::MeshPoint;
+use super::mesh_point::MeshPoint;
 use super::texture::Decoder;
 use super::{ShadeScene, corners, offset_bound};
 use crate::math::alias::AliasTable;
@@ -88,6 +88,8 @@ pub struct LightSeen {
     /// |cosθ| / d² at an area light, m⁻²; 1 for all others.
     pub geometry: f32x16,
 }
+
+crate::lanewise!(LightSeen { wi, distance, target, radiance, geometry });
 
 /// Solid-angle pdf at the receiver, sr⁻¹, of light sampling for a point of area pdf `light_pdf` on a light, at squared
 /// distance `d2` and under the cosine `cos_light` at the light.
@@ -220,10 +222,10 @@ impl Lights {
         }
         gather.finish(&mut point);
         if let Some(environment) = self.environment.as_ref().filter(|_| point.is_env.any()) {
-            let (direction, pdf) = environment.sample(u, v);
+            let (direction, pdf, radiance) = environment.sample(u, v);
             point.p = point.is_env.select(direction, point.p);
             point.pdf = point.is_env.select(point.pdf * pdf, point.pdf);
-            point.emission = point.is_env.select(environment.radiance(direction), point.emission);
+            point.emission = point.is_env.select(radiance, point.emission);
         }
         point.valid = point.pdf.gt(f32x16::ZERO);
         point
@@ -260,10 +262,12 @@ impl Lights {
         self.environment.as_ref().map_or(Rgb::ZERO, |e| e.radiance(dir))
     }
 
-    /// pdf in solid angle with which [`Lights::sample`] finds `dir`, selection included, sr⁻¹.
-    pub fn environment_pdf(&self, dir: Vec3x) -> f32x16 {
-        let selection = splat(self.environment_selection());
-        self.environment.as_ref().map_or(f32x16::ZERO, |e| e.pdf(dir) * selection)
+    /// Radiance of the environment from `dir`, and the pdf in solid angle with which [`Lights::sample`] finds it,
+    /// selection included, sr⁻¹.
+    pub fn environment_with_pdf(&self, dir: Vec3x) -> (Rgb, f32x16) {
+        let Some(environment) = &self.environment else { return (Rgb::ZERO, f32x16::ZERO) };
+        let (radiance, pdf) = environment.radiance_and_pdf(dir);
+        (radiance, pdf * splat(self.environment_selection()))
     }
 
     /// Whether there is an environment that is not black.

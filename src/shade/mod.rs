@@ -7,17 +7,21 @@ mod bsdf;
 mod env;
 pub mod fresnel;
 mod lights;
+mod mesh_point;
 pub mod microfacet;
+mod records;
 mod surface;
 pub mod texture;
 
 pub use bsdf::{Bsdf, BsdfSample, DiracEval, Parameters};
 pub use env::EnvironmentTable;
 pub use lights::{LightPoint, LightSeen, Lights, solid_angle_pdf};
-pub use surface::{Surface, alpha};
+pub use mesh_point::alpha;
+pub use surface::Surface;
 
-use crate::scene::{Instance, Material, Scene};
+use crate::scene::{Instance, Scene};
 use glam::{Mat3A, Vec3, Vec3A};
+use records::Records;
 use texture::Decoder;
 
 /// A scene prepared for shading: the scene itself, light tables and what instances need. Built once.
@@ -31,8 +35,8 @@ pub struct ShadeScene<'a> {
     decoder: Decoder,
     /// One for each instance.
     placements: Vec<Placement>,
-    /// Materials that read texture coordinates.
-    textured: Vec<bool>,
+    /// Triangles and materials, laid out for hits.
+    records: Records,
 }
 
 /// How directions of an instance reach the world.
@@ -62,23 +66,8 @@ impl<'a> ShadeScene<'a> {
         let placements: Vec<_> = scene.instances.iter().map(Placement::new).collect();
         let signs: Vec<_> = placements.iter().map(|p| p.handedness).collect();
         let lights = Lights::new(scene, &decoder, &signs);
-        let textured = scene.materials.iter().map(has_texture).collect();
-        Self { scene, lights, decoder, placements, textured }
+        Self { scene, lights, decoder, placements, records: Records::new(scene) }
     }
-}
-
-/// Whether a material reads any texture.
-fn has_texture(m: &Material) -> bool {
-    let textures = [
-        &m.base_color_texture,
-        &m.metallic_roughness_texture,
-        &m.normal_texture,
-        &m.emission_texture,
-        &m.specular_texture,
-        &m.specular_color_texture,
-        &m.transmission_texture,
-    ];
-    textures.iter().any(|t| t.is_some())
 }
 
 /// World-space corners of a triangle.

@@ -1,13 +1,19 @@
 //! What sixteen rays met: position, normals, material with its textures, emission.
 //!
-//! Attributes are gathered lane by lane from the mesh and worked on sixteen at a time. Positions come from the
-//! barycentrics, whose rounding does not grow with the ray's length.
+//! A lane brings whole cache lines, its triangle, its attributes and its material; transposed they are worked on
+//! sixteen at a time. Textures and normal maps are looked up lane by lane. Positions come from the barycentrics,
+//! whose rounding does not grow with the ray's length.
 
-use super::{Bsdf, Parameters, ShadeScene, corners, offset_bound};
+use super::mesh_point::MeshPoint;
+use super::records::{self, HANDEDNESS, NO_TRIANGLE, OFFSET, UV, flag};
+use super::texture::Footprint;
+use super::{Bsdf, Parameters, ShadeScene};
 use crate::accel::Hits;
+use crate::math::transpose::{Line, columns};
 use crate::math::{Compare, Frame, LANES, Mask, Rgb, Vec3x, f32x16, splat};
-use crate::scene::{AlphaMode, Material, Mesh};
+use crate::scene::TextureRef;
 use glam::{Vec2, Vec3, Vec4};
+use wide::u32x16;
 
 /// What sixteen rays met, geometry and material evaluated.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,12 +42,9 @@ pub struct Surface {
     offset: f32x16,
 }
 
-/// Sixteen floats that are filled lane by lane.
-type Column = [f32; LANES];
-
 /// Sixteen vectors that are filled lane by lane.
 #[derive(Default)]
-struct Column3([Column; 3]);
+struct Column3([[f32; LANES]; 3]);
 
 impl Column3 {
     #[inline(always)]
@@ -57,254 +60,273 @@ impl Column3 {
     }
 }
 
-/// What the lanes bring together.
-#[derive(Default)]
-struct Gathered {
-    p: [Column3; 3],
-    front: Column,
-    normal: Column3,
-    tangent: Column3,
-    bitangent_sign: Column,
-    mapped: Column3,
-    offset: Column,
-    base: Column3,
-    metallic: Column,
-    roughness: Column,
-    specular: Column,
-    specular_color: Column3,
-    ior: Column,
-    transmission: Column,
-    absorption: Column3,
-    emission: Column3,
-    light_pdf: Column,
-    /// Bit sets over the lanes.
-    bits: Flags,
-}
-
-#[derive(Default)]
-struct Flags {
-    smooth_shaded: u16,
-    normal_mapped: u16,
-    solid: u16,
-    emitter: u16,
-    unlit: u16,
-    two_sided: u16,
-}
-
+/// Three columns from `from` on.
 #[inline(always)]
-fn flag(bits: &mut u16, lane: usize, on: bool) {
-    *bits |= u16::from(on) << lane;
+fn vector(columns: &[f32x16; LANES], from: usize) -> Vec3x {
+    Vec3x::new(columns[from], columns[from + 1], columns[from + 2])
 }
 
-/// A point of a mesh: triangle and barycentric weights of its corners.
-#[derive(Clone, Copy)]
-pub(super) struct MeshPoint<'a> {
-    mesh: &'a Mesh,
-    triangle: [u32; 3],
-    weights: Vec3,
-}
-
-impl<'a> MeshPoint<'a> {
-    #[inline(always)]
-    pub(super) fn new(mesh: &'a Mesh, primitive: u32, u: f32, v: f32) -> Self {
-        Self { mesh, triangle: mesh.triangles[primitive as usize], weights: Vec3::new(1.0 - u - v, u, v) }
-    }
-
-    #[inline(always)]
-    fn interpolate<T>(&self, values: &[T]) -> T
-    where
-        T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
-    {
-        let [a, b, c] = self.triangle.map(|i| values[i as usize]);
-        a * self.weights.x + b * self.weights.y + c * self.weights.z
-    }
-
-    /// Both texture coordinate sets; zero where the mesh has none.
-    #[inline(always)]
-    fn uv(&self) -> [Vec2; 2] {
-        let set = |i: usize| self.mesh.uvs[i].as_ref().map_or(Vec2::ZERO, |uv| self.interpolate(uv));
-        [set(0), set(1)]
-    }
-
-    #[inline(always)]
-    fn color(&self) -> Vec4 {
-        self.mesh.colors.as_ref().map_or(Vec4::ONE, |c| self.interpolate(c))
-    }
-}
-
-impl super::texture::Decoder {
-    /// Base colour and alpha: factor × texture × vertex colour.
-    #[inline(always)]
-    fn base(&self, scene: &crate::scene::Scene, material: &Material, at: &MeshPoint, uv: [Vec2; 2]) -> Vec4 {
-        let factor = material.base_color * at.color();
-        material.base_color_texture.as_ref().map_or(factor, |t| factor * self.lookup_ref(scene, t, uv))
-    }
-
-    /// Emitted radiance and the coverage that lets it out.
-    #[inline(always)]
-    pub(super) fn emission(&self, scene: &crate::scene::Scene, at: &MeshPoint) -> (Vec3, f32) {
-        let material = &scene.materials[at.mesh.material as usize];
-        let coverage = if material.has_coverage() { self.coverage(scene, at) } else { 1.0 };
-        let uv = at.uv();
-        let emission = material
-            .emission_texture
-            .as_ref()
-            .map_or(material.emission, |t| material.emission * self.lookup_ref(scene, t, uv).truncate());
-        (emission, coverage)
-    }
-
-    /// Probability that a ray is stopped.
-    #[inline(always)]
-    fn coverage(&self, scene: &crate::scene::Scene, at: &MeshPoint) -> f32 {
-        let material = &scene.materials[at.mesh.material as usize];
-        let alpha = || self.base(scene, material, at, at.uv()).w;
-        match material.alpha_mode {
-            AlphaMode::Opaque => 1.0,
-            AlphaMode::Mask(cutoff) => f32::from(u8::from(alpha() >= cutoff)),
-            AlphaMode::Blend => alpha().clamp(0.0, 1.0),
-        }
-    }
-}
-
-/// Coverage of sixteen hits: the probability in 0..=1 that the surface stops the ray (0 or 1 for masked, 1 for
-/// opaque materials); 0 in lanes that are not active or hit nothing.
-pub fn alpha(scene: &ShadeScene, hits: &Hits, active: Mask) -> f32x16 {
-    let mut coverage = [0.0; LANES];
-    let (u, v) = (hits.u.as_array(), hits.v.as_array());
-    for lane in (active & hits.valid).iter() {
-        let instance = &scene.scene.instances[hits.instance[lane] as usize];
-        let mesh = &scene.scene.meshes[instance.mesh as usize];
-        let at = MeshPoint::new(mesh, hits.primitive[lane], u[lane], v[lane]);
-        coverage[lane] = scene.decoder.coverage(scene.scene, &at);
-    }
-    f32x16::new(coverage)
+/// What the lanes bring together.
+struct Gathered {
+    geometry: [f32x16; LANES],
+    attributes: [f32x16; LANES],
+    /// Base colour, metallic, roughness, specular, specular colour, ior, transmission, absorption.
+    material: [f32x16; LANES],
+    flags: u32x16,
 }
 
 impl Gathered {
-    /// Gathers one lane.
     #[inline(always)]
-    fn lane(&mut self, scene: &ShadeScene, hits: &Hits, lane: usize) {
-        let (index, primitive) = (hits.instance[lane] as usize, hits.primitive[lane]);
-        let instance = &scene.scene.instances[index];
-        let placement = &scene.placements[index];
-        let mesh = &scene.scene.meshes[instance.mesh as usize];
-        let material = &scene.scene.materials[mesh.material as usize];
-        let (u, v) = (hits.u.as_array()[lane], hits.v.as_array()[lane]);
-        let at = MeshPoint::new(mesh, primitive, u, v);
-        let uv = if scene.textured[mesh.material as usize] { at.uv() } else { [Vec2::ZERO; 2] };
-
-        let corners = corners(instance, &mesh.positions, at.triangle);
-        for (column, corner) in self.p.iter_mut().zip(corners) {
-            column.set(lane, corner);
+    fn new(scene: &ShadeScene, hits: &Hits, active: Mask) -> Self {
+        let records = &scene.records;
+        let mut geometry = [NO_TRIANGLE; LANES];
+        let mut attributes = [Line::ZERO; LANES];
+        let mut material = [Line::ZERO; LANES];
+        let mut flags = [0; LANES];
+        for lane in active.iter() {
+            let index = hits.instance[lane] as usize;
+            let triangle = hits.primitive[lane] as usize;
+            let place = &records.places[index];
+            flags[lane] = place.flags;
+            material[lane] = records.materials[place.material];
+            let line = &records.geometry[place.geometry + triangle];
+            if place.flags & flag::MOVED == 0 {
+                geometry[lane] = *line;
+                if place.flags & flag::ATTRIBUTES != 0 {
+                    attributes[lane] = records.attributes[place.attributes + triangle];
+                }
+                continue;
+            }
+            let placement = &scene.placements[index];
+            geometry[lane] = records::moved_geometry(line, &scene.scene.instances[index], placement);
+            if place.flags & flag::ATTRIBUTES != 0 {
+                let line = &records.attributes[place.attributes + triangle];
+                attributes[lane] = records::moved_attributes(line, placement);
+            }
         }
-        self.offset[lane] = offset_bound(corners);
-        self.front[lane] = placement.handedness;
-        if let Some(normals) = &mesh.normals {
-            flag(&mut self.bits.smooth_shaded, lane, true);
-            self.normal.set(lane, placement.normal * at.interpolate(normals));
+        let mut gathered = Self {
+            geometry: columns(&geometry),
+            attributes: [f32x16::ZERO; LANES],
+            material: columns(&material),
+            flags: u32x16::new(flags),
+        };
+        if gathered.has(flag::ATTRIBUTES).any() {
+            gathered.attributes = columns(&attributes);
         }
-        if let (Some(map), Some(tangents)) = (&material.normal_texture, &mesh.tangents) {
-            flag(&mut self.bits.normal_mapped, lane, true);
-            let tangent = at.interpolate(tangents);
-            self.tangent.set(lane, instance.to_world.transform_vector3(tangent.truncate()));
-            self.bitangent_sign[lane] = placement.handedness * tangent.w.signum();
-            let texel = scene.decoder.lookup_ref(scene.scene, map, uv).truncate() * 2.0 - Vec3::ONE;
-            let s = material.normal_scale;
-            self.mapped.set(lane, texel * Vec3::new(s, s, 1.0));
-        }
-        self.light_pdf[lane] = scene.lights.triangle_pdf(index, primitive);
-        self.material(scene, material, &at, uv, lane);
+        gathered
     }
 
-    /// Gathers the material's parameters of one lane.
+    /// Lanes with a flag.
     #[inline(always)]
-    fn material(&mut self, scene: &ShadeScene, m: &Material, at: &MeshPoint, uv: [Vec2; 2], lane: usize) {
-        let decoder = &scene.decoder;
-        let scene = scene.scene;
-        let texel = |t: &Option<crate::scene::TextureRef>| {
-            t.as_ref().map_or(Vec4::ONE, |t| decoder.lookup_ref(scene, t, uv))
-        };
-        let base = decoder.base(scene, m, at, uv).truncate();
-        self.base.set(lane, base);
-        flag(&mut self.bits.two_sided, lane, m.double_sided || m.unlit);
-        flag(&mut self.bits.emitter, lane, m.unlit || m.is_emissive());
-        flag(&mut self.bits.unlit, lane, m.unlit);
-        if m.unlit {
-            self.emission.set(lane, base);
-            return;
-        }
-        if m.is_emissive() {
-            self.emission.set(lane, m.emission * texel(&m.emission_texture).truncate());
-        }
-        let metallic_roughness = texel(&m.metallic_roughness_texture);
-        self.metallic[lane] = m.metallic * metallic_roughness.z;
-        self.roughness[lane] = m.roughness * metallic_roughness.y;
-        self.specular[lane] = m.specular * texel(&m.specular_texture).w;
-        self.specular_color.set(lane, m.specular_color * texel(&m.specular_color_texture).truncate());
-        self.ior[lane] = m.ior;
-        self.transmission[lane] = m.transmission * texel(&m.transmission_texture).x;
-        self.absorption.set(lane, m.absorption);
-        flag(&mut self.bits.solid, lane, m.is_solid);
+    fn has(&self, flag: u32) -> Mask {
+        let flag = u32x16::splat(flag);
+        Mask(bytemuck::cast((self.flags & flag).simd_eq(flag)))
+    }
+
+    /// Texture coordinates of the first set.
+    #[inline(always)]
+    fn uv(&self, weights: [f32x16; 3]) -> [f32x16; 2] {
+        std::array::from_fn(|c| {
+            let corner = |i: usize| self.attributes[UV + 2 * i + c] * weights[i];
+            corner(0) + corner(1) + corner(2)
+        })
     }
 
     /// Unit shading normals on the side of `ng`.
     #[inline(always)]
-    fn shading_normal(&self, ng: Vec3x) -> Vec3x {
-        let zero = f32x16::ZERO;
+    fn shading_normal(&self, ng: Vec3x, weights: [f32x16; 3], map: Option<&NormalMap>) -> Vec3x {
         let mut n = ng;
-        if self.bits.smooth_shaded != 0 {
-            let interpolated = self.normal.wide().normalize();
-            n = (Mask::from_bits(self.bits.smooth_shaded) & interpolated.is_finite()).select(interpolated, n);
+        let smooth = self.has(flag::SMOOTH);
+        if smooth.any() {
+            let corner = |i: usize| vector(&self.attributes, 3 * i) * weights[i];
+            let interpolated = (corner(0) + corner(1) + corner(2)).normalize();
+            n = (smooth & interpolated.is_finite()).select(interpolated, n);
         }
-        if self.bits.normal_mapped != 0 {
-            let tangent = self.tangent.wide();
-            // Gram-Schmidt: interpolation leaves the tangent slightly off the plane of the normal.
-            let t = (tangent - n * n.dot(tangent)).normalize();
-            let b = n.cross(t) * f32x16::new(self.bitangent_sign);
-            let map = self.mapped.wide();
-            let mapped = (t * map.x + b * map.y + n * map.z).normalize();
-            n = (Mask::from_bits(self.bits.normal_mapped) & mapped.is_finite()).select(mapped, n);
+        if let Some(map) = map {
+            let mapped = map.apply(n);
+            n = (self.has(flag::MAPPED) & mapped.is_finite()).select(mapped, n);
         }
-        n.dot(ng).lt(zero).select(-n, n)
+        n.dot(ng).lt(f32x16::ZERO).select(-n, n)
     }
 
     #[inline(always)]
-    fn parameters(&self, base: Rgb) -> Parameters {
-        let unit = |x: Column| f32x16::new(x).fast_max(f32x16::ZERO).fast_min(splat(1.0));
+    fn parameters(&self) -> Parameters {
+        let m = &self.material;
+        let unit = |x: f32x16| x.fast_max(f32x16::ZERO).fast_min(splat(1.0));
         Parameters {
-            base,
-            metallic: unit(self.metallic),
-            roughness: unit(self.roughness),
-            specular: unit(self.specular),
-            specular_color: self.specular_color.wide(),
-            ior: f32x16::new(self.ior),
-            transmission: unit(self.transmission),
-            absorption: self.absorption.wide(),
-            solid: Mask::from_bits(self.bits.solid),
+            base: vector(m, 0),
+            metallic: unit(m[3]),
+            roughness: unit(m[4]),
+            specular: unit(m[5]),
+            specular_color: vector(m, 6),
+            ior: m[9],
+            transmission: unit(m[10]),
+            absorption: vector(m, 11),
+            solid: self.has(flag::SOLID),
         }
     }
 }
 
+/// Multiplies base colour textures into the columns of the material.
+fn apply_base_textures(
+    scene: &ShadeScene,
+    hits: &Hits,
+    lanes: Mask,
+    uv: [f32x16; 2],
+    material: &mut [f32x16; LANES],
+) {
+    let [u, v] = uv.map(f32x16::to_array);
+    // First all reads, none of which waits for another: the texels are rarely in the nearest cache.
+    let mut footprints = [Footprint::default(); LANES];
+    for lane in lanes.iter() {
+        let place = &scene.records.places[hits.instance[lane] as usize];
+        let Some(t) = &scene.scene.materials[place.material].base_color_texture else { continue };
+        let uv = if t.uv_set == 0 { Vec2::new(u[lane], v[lane]) } else { mesh_point(scene, hits, lane).uv()[1] };
+        let texture = &scene.scene.textures[t.texture as usize];
+        footprints[lane] = Footprint::new(texture, t.transform.transform_point2(uv));
+    }
+    let mut texel = Column3([[1.0; LANES]; 3]);
+    for lane in lanes.iter() {
+        texel.set(lane, scene.decoder.filter(&footprints[lane]).truncate());
+    }
+    let base = vector(material, 0) * texel.wide();
+    [material[0], material[1], material[2]] = [base.x, base.y, base.z];
+}
+
+/// Multiplies what other textures and vertex colours say into the columns of the material.
+fn apply_textures(scene: &ShadeScene, hits: &Hits, lanes: Mask, uv: [f32x16; 2], material: &mut [f32x16; LANES]) {
+    let [u, v] = uv.map(f32x16::to_array);
+    let mut columns = material.map(f32x16::to_array);
+    for lane in lanes.iter() {
+        let instance = &scene.scene.instances[hits.instance[lane] as usize];
+        let mesh = &scene.scene.meshes[instance.mesh as usize];
+        let m = &scene.scene.materials[mesh.material as usize];
+        let at = || mesh_point(scene, hits, lane);
+        let second = if mesh.uvs[1].is_some() { at().uv()[1] } else { Vec2::ZERO };
+        let uv = [Vec2::new(u[lane], v[lane]), second];
+        let mut multiply = |from: usize, factors: &[f32]| {
+            for (column, factor) in columns[from..].iter_mut().zip(factors) {
+                column[lane] *= factor;
+            }
+        };
+        let texel = |t: &Option<TextureRef>| t.as_ref().map(|t| scene.decoder.lookup_ref(scene.scene, t, uv));
+        if mesh.colors.is_some() {
+            multiply(0, &at().color().truncate().to_array());
+        }
+        if let Some(t) = texel(&m.metallic_roughness_texture) {
+            multiply(3, &[t.z, t.y]);
+        }
+        if let Some(t) = texel(&m.specular_texture) {
+            multiply(5, &[t.w]);
+        }
+        if let Some(t) = texel(&m.specular_color_texture) {
+            multiply(6, &[t.x, t.y, t.z]);
+        }
+        if let Some(t) = texel(&m.transmission_texture) {
+            multiply(10, &[t.x]);
+        }
+    }
+    *material = columns.map(f32x16::new);
+}
+
+/// The point of the mesh that lane `lane` met.
+#[inline(always)]
+fn mesh_point<'a>(scene: &'a ShadeScene, hits: &Hits, lane: usize) -> MeshPoint<'a> {
+    let instance = &scene.scene.instances[hits.instance[lane] as usize];
+    let mesh = &scene.scene.meshes[instance.mesh as usize];
+    MeshPoint::new(mesh, hits.primitive[lane], hits.u.as_array()[lane], hits.v.as_array()[lane])
+}
+
+/// Normal maps with the tangents they lie in.
+#[derive(Default)]
+struct NormalMap {
+    tangent: Column3,
+    bitangent_sign: [f32; LANES],
+    texel: Column3,
+}
+
+impl NormalMap {
+    fn new(scene: &ShadeScene, hits: &Hits, lanes: Mask) -> Self {
+        let mut map = Self::default();
+        for lane in lanes.iter() {
+            let index = hits.instance[lane] as usize;
+            let at = mesh_point(scene, hits, lane);
+            let material = &scene.scene.materials[at.mesh.material as usize];
+            let (Some(texture), Some(tangents)) = (&material.normal_texture, &at.mesh.tangents) else { continue };
+            let tangent: Vec4 = at.interpolate(tangents);
+            let to_world = &scene.scene.instances[index].to_world;
+            map.tangent.set(lane, to_world.transform_vector3(tangent.truncate()));
+            map.bitangent_sign[lane] = scene.placements[index].handedness * tangent.w.signum();
+            let texel = scene.decoder.lookup_ref(scene.scene, texture, at.uv()).truncate() * 2.0 - Vec3::ONE;
+            let s = material.normal_scale;
+            map.texel.set(lane, texel * Vec3::new(s, s, 1.0));
+        }
+        map
+    }
+
+    /// The mapped normals for shading normals `n`.
+    fn apply(&self, n: Vec3x) -> Vec3x {
+        let tangent = self.tangent.wide();
+        // Gram-Schmidt: interpolation leaves the tangent slightly off the plane of the normal.
+        let t = (tangent - n * n.dot(tangent)).normalize();
+        let b = n.cross(t) * f32x16::new(self.bitangent_sign);
+        let map = self.texel.wide();
+        (t * map.x + b * map.y + n * map.z).normalize()
+    }
+}
+
+/// Radiance and area pdf of the lanes on emissive or unlit surfaces; `base` is their base colour.
+fn emission(scene: &ShadeScene, hits: &Hits, emitters: Mask, base: Rgb) -> (Rgb, f32x16) {
+    let mut radiance = Column3::default();
+    let mut pdf = [0.0; LANES];
+    for lane in emitters.iter() {
+        let at = mesh_point(scene, hits, lane);
+        let material = &scene.scene.materials[at.mesh.material as usize];
+        if material.unlit {
+            radiance.set(lane, base.lane(lane));
+            continue;
+        }
+        let texture = material.emission_texture.as_ref();
+        let texel = texture.map_or(Vec4::ONE, |t| scene.decoder.lookup_ref(scene.scene, t, at.uv()));
+        radiance.set(lane, material.emission * texel.truncate());
+        pdf[lane] = scene.lights.triangle_pdf(hits.instance[lane] as usize, hits.primitive[lane]);
+    }
+    (radiance.wide(), f32x16::new(pdf))
+}
+
 impl Surface {
-    /// Evaluates the `active` lanes that hit something; the other lanes are default. `wo` points back along the rays.
+    /// Evaluates the `active` lanes that hit something; the other lanes scatter and emit nothing, and their `p` has
+    /// no meaning. `wo` points back along the rays.
     pub fn new(scene: &ShadeScene, hits: &Hits, active: Mask, wo: Vec3x) -> Self {
         let active = active & hits.valid;
-        let mut g = Gathered::default();
-        for lane in active.iter() {
-            g.lane(scene, hits, lane);
+        let mut g = Gathered::new(scene, hits, active);
+        let (e1, e2) = (vector(&g.geometry, 3), vector(&g.geometry, 6));
+        let p = vector(&g.geometry, 0) + e1 * hits.u + e2 * hits.v;
+        let ng = (e1.cross(e2) * g.geometry[HANDEDNESS]).normalize();
+        let weights = [splat(1.0) - hits.u - hits.v, hits.u, hits.v];
+        let base_textured = g.has(flag::BASE_TEXTURED);
+        if base_textured.any() {
+            apply_base_textures(scene, hits, base_textured, g.uv(weights), &mut g.material);
         }
-        let [p0, p1, p2] = [g.p[0].wide(), g.p[1].wide(), g.p[2].wide()];
-        let (e1, e2) = (p1 - p0, p2 - p0);
-        let p = p0 + e1 * hits.u + e2 * hits.v;
-        let ng = (e1.cross(e2) * f32x16::new(g.front)).normalize();
-        let unlit = Mask::from_bits(g.bits.unlit);
-        let base = g.base.wide();
-        let frame = Frame::from_normal(g.shading_normal(ng));
-        let bsdf = unlit.select(Bsdf::black(frame), Bsdf::new(frame, &g.parameters(base)));
-        let two_sided = Mask::from_bits(g.bits.two_sided);
+        let textured = g.has(flag::TEXTURED);
+        if textured.any() {
+            apply_textures(scene, hits, textured, g.uv(weights), &mut g.material);
+        }
+        let mapped = g.has(flag::MAPPED);
+        let map = mapped.any().then(|| NormalMap::new(scene, hits, mapped));
+        let frame = Frame::from_normal(g.shading_normal(ng, weights, map.as_ref()));
+        let parameters = g.parameters();
+        let base = parameters.base;
+        let mut bsdf = Bsdf::new(frame, &parameters);
+        let is_emitter = g.has(flag::EMITTER);
+        let (mut emitted, mut light_pdf) = (Rgb::ZERO, f32x16::ZERO);
+        if is_emitter.any() {
+            (emitted, light_pdf) = emission(scene, hits, is_emitter, base);
+            bsdf = g.has(flag::UNLIT).select(Bsdf::black(frame), bsdf);
+        }
+        let two_sided = g.has(flag::TWO_SIDED);
         let lit_side = wo.dot(ng).gt(f32x16::ZERO) | two_sided;
-        let emitted = g.emission.wide();
-        active.keep(Self {
+        Self {
             p,
             ng,
             wo,
@@ -312,11 +334,11 @@ impl Surface {
             emission: lit_side.keep(emitted),
             emitted,
             two_sided,
-            is_emitter: Mask::from_bits(g.bits.emitter),
-            light_pdf: f32x16::new(g.light_pdf),
+            is_emitter,
+            light_pdf,
             albedo: base,
-            offset: f32x16::new(g.offset),
-        })
+            offset: g.geometry[OFFSET],
+        }
     }
 
     /// Radiance towards `w`.

@@ -24,23 +24,54 @@ pub fn srgb_to_linear(x: f32) -> f32 {
     if x <= 0.04045 { x / 12.92 } else { ((f64::from(x) + 0.055) / 1.055).powf(2.4) as f32 }
 }
 
-/// The index inside 0..`size` that stands for `i`.
+/// The two texels that interpolation along one axis takes at coordinate `t` (1 is the whole image), and the weight
+/// of the second. A nearest filter takes the texel that `t` lies in.
 #[inline(always)]
-fn wrap(i: i32, size: u32, mode: Wrap) -> usize {
-    if (i as u32) < size {
-        return i as usize;
-    }
-    let n = i64::from(size);
-    let i = i64::from(i);
-    let wrapped = match mode {
-        Wrap::Repeat => i.rem_euclid(n),
+fn neighbours(t: f32, size: u32, mode: Wrap, linear: bool) -> (u32, u32, f32) {
+    // Whole repetitions go first, while the fraction is exact.
+    let t = match mode {
+        Wrap::Repeat => t - t.floor(),
         Wrap::Mirror => {
-            let m = i.rem_euclid(2 * n);
-            m.min(2 * n - 1 - m)
+            let m = t - 2.0 * (0.5 * t).floor();
+            m.min(2.0 - m)
         }
-        Wrap::Clamp => i.clamp(0, n - 1),
+        Wrap::Clamp => t.clamp(0.0, 1.0),
     };
-    wrapped as usize
+    let last = size - 1;
+    let x = t * size as f32;
+    if !linear {
+        let i = (x as u32).min(last);
+        return (i, i, 0.0);
+    }
+    // A cast from a NaN gives 0, from what is below 0 too.
+    let (above, fraction) = (x + 0.5, (x + 0.5).fract());
+    let right = above as u32;
+    let wrapped = mode == Wrap::Repeat;
+    let first = if right == 0 { if wrapped { last } else { 0 } } else { (right - 1).min(last) };
+    let second = if right > last { if wrapped { 0 } else { last } } else { right };
+    (first, second, fraction)
+}
+
+/// Four texels around a point: upper left, upper right, lower left, lower right; and how far right and down it lies.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Footprint {
+    texels: [[u8; 4]; 4],
+    fraction: Vec2,
+    srgb: bool,
+}
+
+impl Footprint {
+    /// Reads the texels of `texture` around `uv` (after the texture transform).
+    #[inline(always)]
+    pub(super) fn new(texture: &Texture, uv: Vec2) -> Self {
+        let linear = texture.linear_filter;
+        let (x0, x1, fx) = neighbours(uv.x, texture.width, texture.wrap[0], linear);
+        let (y0, y1, fy) = neighbours(uv.y, texture.height, texture.wrap[1], linear);
+        let (upper, lower) = (y0 as usize * texture.width as usize, y1 as usize * texture.width as usize);
+        let texel = |row: usize, x: u32| texture.texels[row + x as usize];
+        let texels = [texel(upper, x0), texel(upper, x1), texel(lower, x0), texel(lower, x1)];
+        Self { texels, fraction: Vec2::new(fx, fy), srgb: texture.srgb }
+    }
 }
 
 impl Decoder {
@@ -52,27 +83,17 @@ impl Decoder {
         Vec4::new(table[r], table[g], table[b], self.linear[a])
     }
 
+    /// Linear RGBA between the texels of a footprint.
+    #[inline(always)]
+    pub(super) fn filter(&self, f: &Footprint) -> Vec4 {
+        let [a, b, c, d] = f.texels.map(|texel| self.decode(texel, f.srgb));
+        a.lerp(b, f.fraction.x).lerp(c.lerp(d, f.fraction.x), f.fraction.y)
+    }
+
     /// Linear RGBA of `texture` at `uv` (after the texture transform).
     #[inline]
     pub fn lookup(&self, texture: &Texture, uv: Vec2) -> Vec4 {
-        let (w, h) = (texture.width, texture.height);
-        let x = uv.x * w as f32;
-        let y = uv.y * h as f32;
-        let texel =
-            |column: usize, row: usize| self.decode(texture.texels[row * w as usize + column], texture.srgb);
-        let [wrap_u, wrap_v] = texture.wrap;
-        if !texture.linear_filter {
-            return texel(wrap(x.floor() as i32, w, wrap_u), wrap(y.floor() as i32, h, wrap_v));
-        }
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (left, top) = (x.floor(), y.floor());
-        let (fx, fy) = (x - left, y - top);
-        let (column, row) = (left as i32, top as i32);
-        let (x0, x1) = (wrap(column, w, wrap_u), wrap(column.saturating_add(1), w, wrap_u));
-        let (y0, y1) = (wrap(row, h, wrap_v), wrap(row.saturating_add(1), h, wrap_v));
-        let upper = texel(x0, y0).lerp(texel(x1, y0), fx);
-        let lower = texel(x0, y1).lerp(texel(x1, y1), fx);
-        upper.lerp(lower, fy)
+        self.filter(&Footprint::new(texture, uv))
     }
 
     /// Linear RGBA of a material's texture at the mesh's coordinates (`uv` of both sets).

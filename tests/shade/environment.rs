@@ -75,7 +75,7 @@ fn directions_follow_the_pdf_and_agree_with_queries() {
         for _ in 0..SAMPLES / LANES {
             let point = prepared.lights.sample(&prepared, random.wide(), random.wide(), random.wide());
             assert!(point.is_env.all() && point.valid.all());
-            let query = prepared.lights.environment_pdf(point.p);
+            let query = prepared.lights.environment_with_pdf(point.p).1;
             for lane in 0..LANES {
                 let d = point.p.lane(lane);
                 assert!((d.length() - 1.0).abs() < 1e-5);
@@ -95,7 +95,7 @@ fn directions_follow_the_pdf_and_agree_with_queries() {
             // pdf · sin θ is constant over a cell, being inside one texel.
             let v = ((i / COLUMNS) as f64 + 0.5) / ROWS as f64;
             let d = Quat::from_rotation_y(rotation) * direction(u, v);
-            let pdf = f64::from(prepared.lights.environment_pdf(Vec3x::splat(d)).as_array()[0]);
+            let pdf = f64::from(prepared.lights.environment_with_pdf(Vec3x::splat(d)).1.as_array()[0]);
             *cell = n * pdf * (PI * v).sin() * TAU * PI / (ROWS * COLUMNS) as f64;
         }
         assert!((expected.iter().sum::<f64>() / n - 1.0).abs() < 1e-4, "the pdf does not integrate to 1");
@@ -151,6 +151,6 @@ fn a_black_environment_is_none() {
     let mut random = Random::new(1);
     let (d, u) = (random.directions(), random.wide());
     assert!(prepared.lights.environment(d).is_zero().all());
-    assert_eq!(prepared.lights.environment_pdf(d).to_array(), [0.0; LANES]);
+    assert_eq!(prepared.lights.environment_with_pdf(d).1.to_array(), [0.0; LANES]);
     assert!(prepared.lights.sample(&prepared, u, u, u).valid.none());
 }

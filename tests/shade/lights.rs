@@ -112,7 +112,7 @@ fn is_spot(scene: &ShadeScene, point: &gdpt::shade::LightPoint, lane: usize) -> 
 fn the_environment_alone_is_always_selected() {
     let scene = Scene { environment: many().environment, ..Scene::default() };
     let prepared = ShadeScene::new(&scene);
-    let pdf = prepared.lights.environment_pdf(Vec3x::splat(Vec3::new(0.48, 0.6, 0.64))).as_array()[0];
+    let pdf = prepared.lights.environment_with_pdf(Vec3x::splat(Vec3::new(0.48, 0.6, 0.64))).1.as_array()[0];
     // Density ∝ sin θ of the row's middle over sin θ: here the rows are equal and sin θ = 0.8.
     assert!((pdf - 1.0 / (2.0 * std::f32::consts::PI.powi(2) * 0.8)).abs() < 1e-5);
 }
