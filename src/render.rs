@@ -3,10 +3,11 @@
 
 pub mod job;
 pub mod metadata;
+mod passes;
 mod prepare;
 pub mod resolve;
 
-pub use self::job::{Backend, CameraChoice, EnvironmentOptions, Format, Job, Lens, Output, Source};
+pub use self::job::{Backend, CameraChoice, EnvironmentOptions, Format, Job, Lens, Output, Source, Stop};
 pub use self::prepare::open;
 use self::prepare::{check_memory, load};
 
@@ -14,7 +15,7 @@ use crate::accel::embree::flush_denormals;
 use crate::accel::{Accel, EmbreeAccel, ObvhsAccel};
 use crate::error::{Error, Result};
 use crate::film::{Buffers, Film, Half, Plane};
-use crate::integrate::{self, Statistics};
+use crate::integrate::{self, Settings, Statistics};
 use crate::reconstruct::{Alpha, Input, Method, Solution, reconstruct};
 use crate::scene::{Camera, LoadReport, Scene};
 use crate::store::{Window, atomic, exr, layers, png};
@@ -98,6 +99,8 @@ pub struct Report {
     pub size: [u32; 2],
     /// Triangles over all instances.
     pub triangles: u64,
+    /// Samples a pixel, fewer than asked for where the job was to stop.
+    pub spp: u32,
     /// Samples over all pixels.
     pub samples: u64,
     /// How the image was found.
@@ -115,7 +118,7 @@ pub fn run(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Repo
         atomic::probe(&output.path, &job.inputs())?;
     }
     check_memory(job)?;
-    let work = Work { job, monitor, cancel, pool: pool(job.threads)? };
+    let work = Work { job, monitor, cancel, pool: pool(job.threads)?, start: Instant::now() };
     let mut seconds = Seconds::default();
 
     monitor.stage("load");
@@ -141,7 +144,8 @@ pub fn run(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Repo
     work.go_on()?;
 
     monitor.stage("write");
-    let (written, time) = timed(|| work.pool.install(|| write(job, &film, &camera, &solved)));
+    let done = job.with_samples(film.samples(Half::Both));
+    let (written, time) = timed(|| work.pool.install(|| write(&done, &film, &camera, &solved)));
     written?;
     seconds.write = time;
 
@@ -151,7 +155,8 @@ pub fn run(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Repo
         load: scene.report.clone(),
         size: [film.width as u32, film.height as u32],
         triangles: scene.triangle_count(),
-        samples: film.width as u64 * film.height as u64 * u64::from(film.samples(Half::Both)),
+        spp: done.settings.spp,
+        samples: film.width as u64 * film.height as u64 * u64::from(done.settings.samples_taken()),
         solve: Solve::of(&solved.solution),
         dropped_samples: film.dropped_samples,
         threads: job.threads,
@@ -173,6 +178,7 @@ struct Work<'a> {
     monitor: &'a dyn Monitor,
     cancel: &'a AtomicBool,
     pool: ThreadPool,
+    start: Instant,
 }
 
 impl Work<'_> {
@@ -195,14 +201,61 @@ impl Work<'_> {
         seconds.build = time;
         self.go_on()?;
 
-        self.monitor.stage("render");
-        let settings = &self.job.settings;
-        let on_progress = |done, total| self.monitor.progress(done, total);
-        let integrate = || integrate::run(scene, &accel, camera, settings, &on_progress, self.cancel);
-        let (result, time) = timed(|| self.pool.install(integrate));
+        let (settings, stop) = (&self.job.settings, &self.job.stop);
+        let mut renderer = Renderer { work: self, scene, accel: &accel, camera };
+        let (result, time) = timed(|| passes::run(settings, stop, self.start, &mut renderer));
         seconds.render = time;
         self.go_on()?;
-        Ok(result)
+        result.ok_or(Error::Interrupted(0))
+    }
+}
+
+/// A scene before one backend.
+struct Renderer<'a, A> {
+    work: &'a Work<'a>,
+    scene: &'a Scene,
+    accel: &'a A,
+    camera: &'a Camera,
+}
+
+impl<A: Accel> Renderer<'_, A> {
+    /// Integrates; the work is part `part` of `parts`.
+    fn integrate(&self, settings: &Settings, part: u64, parts: u64) -> (Film, Statistics) {
+        let &Work { monitor, cancel, start, job, .. } = self.work;
+        let on_progress = |done: u64, total: u64| match job.stop.seconds {
+            Some(limit) => {
+                let milliseconds = |seconds: f64| (1e3 * seconds) as u64;
+                monitor.progress(milliseconds(start.elapsed().as_secs_f64().min(limit)), milliseconds(limit));
+            }
+            None => monitor.progress(part * total + done, parts * total),
+        };
+        let run = || integrate::run(self.scene, self.accel, self.camera, settings, &on_progress, cancel);
+        self.work.pool.install(run)
+    }
+}
+
+impl<A: Accel> passes::Passes for Renderer<'_, A> {
+    fn pass(&mut self, settings: &Settings) -> Option<(Film, Statistics)> {
+        if self.work.job.stop.seconds.is_none()
+            || settings.first_sample == self.work.job.settings.first_sample
+        {
+            self.work.monitor.stage("render");
+        }
+        let common = settings.common_random_numbers;
+        let own = Settings { common_random_numbers: false, ..*settings };
+        let (mut film, mut statistics) = self.integrate(&own, 0, if common { 2 } else { 1 });
+        if common {
+            let (other, more) = self.integrate(settings, 1, 2);
+            film = film.with_differences_of(&other);
+            statistics.add(&more);
+        }
+        self.work.go_on().ok().map(|()| (film, statistics))
+    }
+
+    fn trial(&mut self, film: &Film) -> Option<f64> {
+        let job = self.work.job;
+        let solved = self.work.pool.install(|| solve(&film.buffers(), job.method, job.alpha));
+        Solve::of(&solved.solution).rel_mse
     }
 }
 

@@ -22,6 +22,7 @@ pub fn run(flags: RenderFlags) -> Result<()> {
     let result = render::run(&job, &progress, &signals.cancel);
     progress.finish();
     let report = result.map_err(|e| signals.name(e))?;
+    let job = job.with_samples(report.spp);
     if let Some(path) = &flags.stats_json {
         atomic::write(path, statistics::json(&job, &report).as_bytes())?;
     }
@@ -51,7 +52,7 @@ fn summary(job: &Job, report: &Report, verbose: bool) -> String {
     let s = &job.settings;
     let integrator = metadata::integrator_name(s.kind);
     row("scene", format!("{}, {} triangles", job.source.name(), report.triangles));
-    row("image", format!("{width}x{height}, {} spp, {integrator}, seed {}", s.spp, s.seed));
+    row("image", format!("{width}x{height}, {} spp, {integrator}, seed {}", s.samples_taken(), s.seed));
     if report.solve.method != Method::None {
         row("reconstruct", solve_row(&report.solve));
     }

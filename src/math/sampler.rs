@@ -2,7 +2,9 @@
 //! that any sample can be replayed, split over machines or resumed.
 //!
 //! Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling") in padded sets of four
-//! dimensions; every stream (pixel or block) scrambles with a seed of its own. Sixteen lanes at a time, the numbers
+//! dimensions; every stream (pixel or block) scrambles with a seed of its own. Samples of even and of odd index are two
+//! sequences with scrambles of their own: the halves of a film are independent, so that half their difference has the
+//! noise of their mean. That costs 5 to 12 % of variance at 16 to 64 samples against one sequence. Sixteen lanes at a time, the numbers
 //! are those of the crate `sobol_burley`, which works on one.
 
 use super::{LANES, f32x16};
@@ -52,6 +54,14 @@ pub enum Stream {
 }
 
 impl Stream {
+    /// The stream that stands for all pixels or all blocks; it belongs to none.
+    pub fn common(self) -> Self {
+        match self {
+            Self::Pixel(..) => Self::Pixel(u32::MAX, u32::MAX),
+            Self::Block(..) => Self::Block(u32::MAX, u32::MAX),
+        }
+    }
+
     /// The scrambling seed of this stream.
     pub fn seed(self, seed: u64) -> u32 {
         let (x, y, salt) = match self {
@@ -69,6 +79,7 @@ const SEQUENCE: u32 = 1 << 16;
 #[inline]
 pub fn sample_4d(stream_seed: u32, index: u32, set: u32) -> [f32; 4] {
     // Each set is a four-dimensional sequence of its own, decorrelated by its scramble (padding).
+    // Even and odd samples are sequences of their own.
     let (half, index) = (index << 31, index >> 1);
     let scramble = hash(stream_seed, set.wrapping_add((index / SEQUENCE).wrapping_mul(0x1_0001)) ^ half);
     sobol_burley::sample_4d(index % SEQUENCE, 0, scramble)
@@ -165,12 +176,7 @@ pub fn sample_4d_wide(stream_seeds: &[u32; LANES], indices: &[u32; LANES], set: 
     // Written out, so that the four chains of multiplications overlap.
     let [a, b, c, d] = points;
     let [salt_a, salt_b, salt_c, salt_d] = SALTS;
-    [
-        finish(a, seed, salt_a),
-        finish(b, seed, salt_b),
-        finish(c, seed, salt_c),
-        finish(d, seed, salt_d),
-    ]
+    [finish(a, seed, salt_a), finish(b, seed, salt_b), finish(c, seed, salt_c), finish(d, seed, salt_d)]
 }
 
 #[cfg(test)]

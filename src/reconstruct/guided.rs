@@ -23,7 +23,7 @@ const WIDE: f32 = 2.0;
 /// The same of V.
 const NARROW: f32 = 0.7;
 /// V is at least this share of what it is in the wide neighbourhood.
-const SHARE: f32 = 0.3;
+const SHARE: f32 = 0.6;
 /// Distance of neighbouring pixels' positions in the features: small against the range of normals and albedo.
 const STEP: f32 = 0.007;
 /// Variance at which a pixel has half a say in the regression, in medians.
@@ -41,7 +41,7 @@ pub(super) fn clean(features: &Features, halves: &mut [Plane; 2]) -> Vec<f32> {
     }
     let middle = sorted.len() / 2;
     let doubt = DOUBT * *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
-    let weights = wide.par_iter().zip(&variance).map(|(w, v)| doubt / (w.max(SHARE * v) + doubt)).collect();
+    let weights = wide.par_iter().zip(&variance).map(|(w, v)| doubt / (w.max(0.3 * v) + doubt)).collect();
     let guide = Guide { width, height, features: prepare(features, width), weights };
     for radius in RADII {
         let predicted = regress(&guide, [&halves[0], &halves[1]], radius);

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 /// Standard deviation of the Gaussian along a difference's edge, pixels.
 const EDGE_SIGMA: f32 = 1.5;
 /// The same for the primal, both directions.
-const PRIMAL_SIGMA: f32 = 2.0;
+const PRIMAL_SIGMA: f32 = 2.5;
 
 /// Variances of one kind of row, one a pixel.
 #[derive(Clone, Debug)]
@@ -103,7 +103,7 @@ impl Variances {
         Self { width: self.width, values, known: Vec::new() }
     }
 
-    /// The weights 1/(v + floor) with a floor far below the median, in units of the median.
+    /// The weights 1/(v + floor), in units of the median variance, and that median.
     pub fn weights(&self) -> (f32, Vec<f32>) {
         let mut positive: Vec<f32> = self.values.iter().copied().filter(|v| *v > 0.0).collect();
         if positive.is_empty() {
@@ -116,8 +116,9 @@ impl Variances {
     }
 }
 
-/// What no variance is below, in medians: where both halves agree by chance, they are not exact.
-const FLOOR: f32 = 0.2;
+/// Added to every variance, in medians: what one pair of halves says of a quiet row is not to be believed, and weights
+/// of one order of magnitude are solved for sooner.
+const FLOOR: f32 = 0.4;
 
 /// Gaussian weights of offsets 0 to 3 `sigma`.
 fn kernel(sigma: f32) -> Vec<f32> {

@@ -17,6 +17,8 @@ pub(super) const FEATURES: usize = 7;
 const CHANNELS: usize = 6;
 /// Added to the variance of every feature.
 const RIDGE: f32 = 1e-5;
+/// Features farther than this from a tile's median count as this far.
+const REACH: f32 = 2.0;
 /// Pairs of features.
 const PAIRS: usize = FEATURES * (FEATURES + 1) / 2;
 /// Sums over a window: weight, features, pairs of features, channels, features by channels.
@@ -70,7 +72,8 @@ impl Tile {
     }
 
     /// Reads the pixels around the tile whose left upper pixel is (x0, y0); the weight outside is zero. Features are
-    /// taken relative to their mean, so that squares keep their digits.
+    /// taken relative to their medians in the tile and cut at [`REACH`], so that their products keep their digits
+    /// whatever lies behind.
     fn load(&mut self, guide: &Guide, images: [&Plane; 2], x0: usize, y0: usize) {
         let at = |start: usize, i: usize, end: usize| {
             (start + i).checked_sub(2 * self.radius).filter(|&x| x < end)
@@ -79,15 +82,13 @@ impl Tile {
             let (x, y) = (at(x0, x, guide.width)?, at(y0, y, guide.height)?);
             Some(y * guide.width + x)
         };
-        let mut sum = [0.0f64; FEATURES];
-        let mut count = 0.0f64;
-        for i in
-            (0..self.rows).flat_map(|y| (0..self.width).map(move |x| (x, y))).filter_map(|(x, y)| pixel(x, y))
-        {
-            sum.iter_mut().zip(guide.features[i]).for_each(|(s, f)| *s += f64::from(f));
-            count += 1.0;
-        }
-        let mean = sum.map(|s| (s / count.max(1.0)) as f32);
+        let some = (0..self.rows).step_by(7).flat_map(|y| (0..self.width).step_by(11).map(move |x| (x, y)));
+        let some: Vec<usize> = some.filter_map(|(x, y)| pixel(x, y)).collect();
+        let median: [f32; FEATURES] = std::array::from_fn(|j| {
+            let mut values: Vec<f32> = some.iter().map(|&i| guide.features[i][j]).collect();
+            let middle = values.len() / 2;
+            if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f32::total_cmp).1 }
+        });
         for y in 0..self.rows {
             for x in 0..self.width {
                 let to = y * self.width + x;
@@ -95,7 +96,8 @@ impl Tile {
                 let weight = from.map_or(0.0, |i| guide.weights[i]);
                 self.weight[to] = weight;
                 for j in 0..FEATURES {
-                    let feature = from.map_or(0.0, |i| guide.features[i][j] - mean[j]);
+                    let relative = from.map_or(0.0, |i| guide.features[i][j] - median[j]);
+                    let feature = relative.clamp(-REACH, REACH);
                     self.features[j][to] = feature;
                     self.weighted[j][to] = weight * feature;
                 }
@@ -202,7 +204,9 @@ fn solve(sum: impl Fn(usize) -> f32x16) -> [f32x16; COEFFICIENTS - 1] {
     let weight = sum(0);
     let inverse = weight.simd_gt(zero).select(splat(1.0) / weight, zero);
     let mean: [f32x16; FEATURES] = std::array::from_fn(|i| sum(1 + i) * inverse);
-    // Cholesky: covariance + ridge = L Lᵀ; the diagonal holds the inverse of L's.
+    // Cholesky: covariance + ridge = L Lᵀ; the diagonal holds the inverse of L's. No pivot is below the ridge but by
+    // rounding; such a feature is left out.
+    let least = splat(0.5 * RIDGE);
     let mut l = [[zero; FEATURES]; FEATURES];
     for i in 0..FEATURES {
         for j in 0..=i {
@@ -213,7 +217,11 @@ fn solve(sum: impl Fn(usize) -> f32x16) -> [f32x16; COEFFICIENTS - 1] {
             for k in 0..j {
                 v -= l[i][k] * l[j][k];
             }
-            l[i][j] = if i == j { splat(1.0) / v.max(splat(0.01 * RIDGE)).sqrt() } else { v * l[j][j] };
+            l[i][j] = if i == j {
+                v.simd_gt(least).select(splat(1.0) / v.max(least).sqrt(), zero)
+            } else {
+                v * l[j][j]
+            };
         }
     }
     let mut out = [zero; COEFFICIENTS - 1];

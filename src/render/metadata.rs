@@ -62,7 +62,7 @@ pub fn settings(job: &Job) -> Vec<(&'static str, String)> {
     let s = &job.settings;
     let mut list = vec![
         ("integrator", integrator_name(s.kind).to_owned()),
-        ("spp", s.spp.to_string()),
+        ("spp", s.samples_taken().to_string()),
         ("samples", format!("{}..{}", s.first_sample, u64::from(s.first_sample) + u64::from(s.spp))),
         ("seed", s.seed.to_string()),
         ("size", format!("{}x{}", s.width, s.height)),
@@ -78,6 +78,9 @@ pub fn settings(job: &Job) -> Vec<(&'static str, String)> {
     if s.kind == Kind::GradientPath {
         list.push(("shift_threshold", s.shift_threshold.to_string()));
         list.push(("pair_mis", on_off(s.pair_mis)));
+    }
+    if s.common_random_numbers {
+        list.push(("common_random_numbers", on_off(true)));
     }
     if let Some([x0, y0, x1, y1]) = s.crop {
         list.push(("crop", format!("{x0},{y0},{x1},{y1}")));

@@ -115,7 +115,17 @@ impl EnvironmentTable {
         columns.chunks_exact(width + 1).for_each(|row| push_guide(&mut column_guide, row));
         let (sin_rotation, cos_rotation) = environment.rotation.sin_cos();
         let texels = texels.clone();
-        Some(Self { width, height, texels, sin_rotation, cos_rotation, rows, columns, row_guide, column_guide })
+        Some(Self {
+            width,
+            height,
+            texels,
+            sin_rotation,
+            cos_rotation,
+            rows,
+            columns,
+            row_guide,
+            column_guide,
+        })
     }
 
     /// Texture coordinates of a direction: u in [0, 1], v in [0, 1], and sin θ.

@@ -181,7 +181,8 @@ fn apply_base_textures(
     for lane in lanes.iter() {
         let place = &scene.records.places[hits.instance[lane] as usize];
         let Some(t) = &scene.scene.materials[place.material].base_color_texture else { continue };
-        let uv = if t.uv_set == 0 { Vec2::new(u[lane], v[lane]) } else { mesh_point(scene, hits, lane).uv()[1] };
+        let uv =
+            if t.uv_set == 0 { Vec2::new(u[lane], v[lane]) } else { mesh_point(scene, hits, lane).uv()[1] };
         let texture = &scene.scene.textures[t.texture as usize];
         footprints[lane] = Footprint::new(texture, t.transform.transform_point2(uv));
     }
@@ -194,7 +195,13 @@ fn apply_base_textures(
 }
 
 /// Multiplies what other textures and vertex colours say into the columns of the material.
-fn apply_textures(scene: &ShadeScene, hits: &Hits, lanes: Mask, uv: [f32x16; 2], material: &mut [f32x16; LANES]) {
+fn apply_textures(
+    scene: &ShadeScene,
+    hits: &Hits,
+    lanes: Mask,
+    uv: [f32x16; 2],
+    material: &mut [f32x16; LANES],
+) {
     let [u, v] = uv.map(f32x16::to_array);
     let mut columns = material.map(f32x16::to_array);
     for lane in lanes.iter() {
@@ -252,7 +259,9 @@ impl NormalMap {
             let index = hits.instance[lane] as usize;
             let at = mesh_point(scene, hits, lane);
             let material = &scene.scene.materials[at.mesh.material as usize];
-            let (Some(texture), Some(tangents)) = (&material.normal_texture, &at.mesh.tangents) else { continue };
+            let (Some(texture), Some(tangents)) = (&material.normal_texture, &at.mesh.tangents) else {
+                continue;
+            };
             let tangent: Vec4 = at.interpolate(tangents);
             let to_world = &scene.scene.instances[index].to_world;
             map.tangent.set(lane, to_world.transform_vector3(tangent.truncate()));
