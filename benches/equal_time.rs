@@ -82,9 +82,9 @@ fn table(name: &str, scene: &Scene, size: (u32, u32), spp: u32) {
     // Two independent halves differ by 4 times the variance of their mean.
     let noise = rel_mse(&first, &second) / 4.0;
     let film = render(scene, &embree, &settings(Kind::GradientPath, size, spp, 7));
-    let (primal, dx, dy) = (film.primal(Half::Both), film.dx(Half::Both), film.dy(Half::Both));
-    let input = reconstruct::Input { primal: &primal, dx: &dx, dy: &dy };
-    let pt_error = error(&primal, &reference, noise);
+    let buffers = film.buffers();
+    let input = reconstruct::Input::from(&buffers);
+    let pt_error = error(&buffers.all.primal, &reference, noise);
     println!("\n{name}, {}x{}, {spp} spp, depth 8, median of {REPEATS}", size.0, size.1);
     println!("  wall seconds: Embree PT {pt:.3}, G-PT {gpt:.3}; obvhs PT {pt_obvhs:.3}, G-PT {gpt_obvhs:.3}");
     println!(
@@ -93,8 +93,8 @@ fn table(name: &str, scene: &Scene, size: (u32, u32), spp: u32) {
         pt_obvhs / pt,
         gpt_obvhs / gpt
     );
-    for method in [Method::L2, Method::L1] {
-        let solution = reconstruct::reconstruct(&input, method, 0.2);
+    for method in [Method::L2, Method::L1, Method::Weighted] {
+        let solution = reconstruct::reconstruct(&input, method, reconstruct::Alpha::Fixed(0.2));
         let gain = pt_error / error(&solution.image, &reference, noise);
         println!(
             "  relMSE of PT over {method:?}: {gain:.1} at equal spp, {:.1} at equal time (PT {pt_error:.3e})",

@@ -23,14 +23,6 @@ pub fn primal(film: &Film) -> Result<Plane> {
     image(&film.primal(Half::Both), &features.albedo, &features.normal)
 }
 
-/// The whole image: [`primal`] and very direct light, which no denoiser touches.
-pub fn film(film: &Film) -> Result<Plane> {
-    let (image, direct) = (primal(film)?, film.direct());
-    let add = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| a[c] + b[c]);
-    let data = image.data.iter().zip(&direct.data).map(add).collect();
-    Ok(Plane { width: image.width, height: image.height, data })
-}
-
 /// Denoises `image`, radiance in linear Rec.709, by `albedo` (0 to 1) and `normal` (unit, world space); all of one
 /// size.
 #[cfg(feature = "denoise")]

@@ -2,29 +2,17 @@
 //! what the frequency model says of it.
 //!
 //! No reference is needed: with K runs, the noise of one is its difference from the mean of all, times √(K/(K − 1)).
-//! Where a film has but its two halves, the whole film has half their noise power (the samples of a pixel are
-//! stratified over both halves, so this is an upper bound).
+//! Where a film has but its two halves, which are independent, the whole film has half their noise power.
 
 use super::model;
 use super::spectrum::{Kind, Spectrum};
-use crate::film::Plane;
-use crate::reconstruct::{Input, Method, reconstruct};
+use crate::film::{Measured, Plane};
+use crate::reconstruct::{Alpha, Input, Method, reconstruct};
 
 /// Values of α a sweep solves for: about two an octave from 1/64 to 4.
 pub const SWEEP: [f32; 17] = [
     0.0156, 0.022, 0.031, 0.044, 0.0625, 0.088, 0.125, 0.177, 0.25, 0.354, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0,
 ];
-
-/// One independent estimate of an image and its differences.
-#[derive(Clone, Debug)]
-pub struct Run {
-    /// Radiance without very direct light.
-    pub primal: Plane,
-    /// Differences to the right.
-    pub dx: Plane,
-    /// Differences downwards.
-    pub dy: Plane,
-}
 
 /// Variance gain of the solve at one α.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -63,10 +51,11 @@ pub struct Noise {
 impl Noise {
     /// Measures `runs` of one size, two at least (`None` otherwise). `share` is the noise power of what is asked
     /// about over that of one run: 1, or ½ where the runs are the halves of a film.
-    pub fn measure(runs: &[Run], share: f64, alpha: f32) -> Option<Self> {
+    pub fn measure(runs: &[Measured], share: f64, alpha: f32) -> Option<Self> {
         let first = runs.first()?;
         let size = |p: &Plane| (p.width, p.height);
-        let one_size = |r: &Run| [&r.primal, &r.dx, &r.dy].iter().all(|p| size(p) == size(&first.primal));
+        let one_size =
+            |r: &Measured| [&r.primal, &r.dx, &r.dy].iter().all(|p| size(p) == size(&first.primal));
         if runs.len() < 2 || !runs.iter().all(one_size) {
             return None;
         }
@@ -134,9 +123,8 @@ impl Noise {
 }
 
 /// Least-squares solutions of the runs, as noise.
-fn solved(runs: &[Run], alpha: f32) -> Vec<Plane> {
-    let solve =
-        |r: &Run| reconstruct(&Input { primal: &r.primal, dx: &r.dx, dy: &r.dy }, Method::L2, alpha).image;
+fn solved(runs: &[Measured], alpha: f32) -> Vec<Plane> {
+    let solve = |r: &Measured| reconstruct(&Input::new(r), Method::L2, Alpha::Fixed(alpha)).image;
     let solutions: Vec<Plane> = runs.iter().map(solve).collect();
     deviations(solutions.iter())
 }

@@ -15,8 +15,8 @@ Examples:
   gdpt analyze scene.exr -o analysis
   gdpt analyze seed-0.exr seed-1.exr seed-2.exr seed-3.exr --json
 
-One file is measured by its two halves: an upper bound, since both share the stratification of their samples.
-Several files are renders of one view with different seeds; they measure better. alpha* is the root of the noise
+One file is measured by its two halves. Several files are renders of one view with different seeds; they measure
+better. alpha* is the root of the noise
 of the differences over that of the colours, the best alpha of a least-squares solve.
 The folder gets spectra and sweep, as .csv and .svg, and two maps, ratio-dx.png and ratio-dy.png: the variance of a
 difference over that of the colours; blue is below 1, where gradients pay, white is 1, red is above.";

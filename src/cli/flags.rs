@@ -4,8 +4,8 @@ use super::progress;
 use crate::denoise;
 use crate::error::{Error, Result};
 use crate::integrate::{Filter, Kind, Settings};
-use crate::reconstruct::Method;
-use crate::render::{Backend, CameraChoice, EnvironmentOptions, Format, Job, Lens, Output, Source};
+use crate::reconstruct::{Alpha, Method};
+use crate::render::{Backend, CameraChoice, EnvironmentOptions, Format, Job, Lens, Output, Source, Stop};
 use crate::scene::{LightUnit, LoadOptions};
 use crate::store::layers::Layer;
 use crate::store::png::ToneMap;
@@ -44,6 +44,12 @@ pub enum MethodFlag {
     L1,
     /// Least squares: unbiased
     L2,
+    /// Least squares, each measurement weighed by its noise
+    Weighted,
+    /// The weighted image, single bad pixels mended by what the first hits tell: the least error
+    Guided,
+    /// The one with the least estimated error
+    Auto,
     /// The sampled image, gradients unused
     None,
 }
@@ -54,6 +60,9 @@ impl MethodFlag {
         match self {
             Self::L1 => Method::L1,
             Self::L2 => Method::L2,
+            Self::Weighted => Method::Weighted,
+            Self::Guided => Method::Guided,
+            Self::Auto => Method::Auto,
             Self::None => Method::None,
         }
     }
@@ -137,9 +146,18 @@ pub struct RenderFlags {
     /// How light is transported
     #[arg(long, value_name = "METHOD", default_value = "gpt")]
     integrator: IntegratorFlag,
-    /// Samples a pixel
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
-    spp: u32,
+    /// Samples a pixel [default: 64; as many as it takes with --target-error or --time-limit]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    spp: Option<u32>,
+    /// Ends when the estimated relative error of the image is below X: 0.02 is 2 %
+    #[arg(long, value_name = "X", value_parser = positive)]
+    target_error: Option<f32>,
+    /// Ends in time for everything to be written after so long: 90s, 5m, 1h
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    time_limit: Option<f64>,
+    /// With --integrator pt: half the samples use the same random numbers in all pixels, and give the gradients
+    #[arg(long)]
+    common_random_numbers: bool,
     /// Columns and rows [default: 1280x720; 512x512 for built-in scenes]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
@@ -161,12 +179,12 @@ pub struct RenderFlags {
     /// Pixel filter
     #[arg(long, value_name = "FILTER", default_value = "box")]
     filter: FilterFlag,
-    /// How the image is found from samples and gradients [default: l1; none with --integrator pt]
+    /// How the image is found from samples and gradients [default: guided; none with --integrator pt]
     #[arg(long, value_name = "NORM")]
     reconstruct: Option<MethodFlag>,
-    /// Weight of the samples against the gradients in the reconstruction
-    #[arg(long, value_name = "X", default_value_t = 0.2, value_parser = positive)]
-    alpha: f32,
+    /// Weight of the samples against the gradients, for l1 and l2: a number, or auto for that of the measured noise
+    #[arg(long, value_name = "X|auto", default_value = "0.2", value_parser = alpha)]
+    alpha: Alpha,
     /// Roughness (GGX alpha) up to which a bounce is shifted as a mirror's
     #[arg(long, value_name = "ROUGHNESS", default_value_t = 0.001, value_parser = fraction)]
     shift_threshold: f32,
@@ -237,6 +255,9 @@ pub struct RenderFlags {
     pub verbose: bool,
 }
 
+/// Where nothing but an error or a time ends a render.
+const MOST_SAMPLES: u32 = 1 << 20;
+
 /// A list of layers.
 type Layers = Vec<Layer>;
 
@@ -253,6 +274,21 @@ pub fn finite(text: &str) -> std::result::Result<f32, String> {
 /// A number above zero.
 pub fn positive(text: &str) -> std::result::Result<f32, String> {
     number(text, |v| v > 0.0, "a number above 0")
+}
+
+/// `auto` or a number above zero.
+pub fn alpha(text: &str) -> std::result::Result<Alpha, String> {
+    if text == "auto" {
+        return Ok(Alpha::Auto);
+    }
+    number(text, |v| v > 0.0, "auto or a number above 0").map(Alpha::Fixed)
+}
+
+fn duration(text: &str) -> std::result::Result<f64, String> {
+    let units = [('s', 1.0), ('m', 60.0), ('h', 3600.0)];
+    let parse = |(unit, seconds)| Some(text.strip_suffix(unit)?.parse::<f64>().ok()? * seconds);
+    let value = units.into_iter().find_map(parse).filter(|v| v.is_finite() && *v > 0.0);
+    value.ok_or_else(|| "is not a time like 90s, 5m or 1h".into())
 }
 
 fn non_negative(text: &str) -> std::result::Result<f32, String> {
@@ -352,7 +388,8 @@ impl RenderFlags {
             height,
             crop: self.crop,
             first_sample: 0,
-            spp: self.spp,
+            spp: self.samples(),
+            common_random_numbers: self.common_random_numbers,
             max_depth: self.max_depth,
             rr_depth: self.rr_depth,
             seed: self.seed,
@@ -364,8 +401,10 @@ impl RenderFlags {
             shift_threshold: self.shift_threshold,
             pair_mis: self.pair_mis == Switch::On,
             features: layers.iter().any(|l| l.needs_features())
+                || self.buffers
+                || denoised.is_some()
                 || self.background == Switch::Off
-                || denoised.is_some(),
+                || matches!(method, Method::Guided | Method::Auto),
         };
         let cpus = || std::thread::available_parallelism().map_or(1, |n| n.get());
         Ok(Job {
@@ -387,6 +426,7 @@ impl RenderFlags {
             robust: self.robust,
             threads: self.threads.map_or_else(cpus, |n| n as usize),
             max_memory: self.max_memory,
+            stop: Stop { seconds: self.time_limit, error: self.target_error.map(f64::from) },
             method,
             alpha: self.alpha,
             layers,
@@ -413,13 +453,25 @@ impl RenderFlags {
 
     fn method(&self) -> Result<(Kind, Method)> {
         let method = self.reconstruct.map(MethodFlag::method);
+        let common = self.common_random_numbers;
         match (self.integrator, method) {
-            (IntegratorFlag::Gpt, method) => Ok((Kind::GradientPath, method.unwrap_or(Method::L1))),
+            (IntegratorFlag::Gpt, _) if common => Err(usage(
+                "--common-random-numbers needs --integrator pt: gpt has gradients of its own".into(),
+            )),
+            (IntegratorFlag::Gpt, method) => Ok((Kind::GradientPath, method.unwrap_or_default())),
+            (IntegratorFlag::Pt, method) if common => Ok((Kind::Path, method.unwrap_or_default())),
             (IntegratorFlag::Pt, None | Some(Method::None)) => Ok((Kind::Path, Method::None)),
-            (IntegratorFlag::Pt, Some(_)) => {
-                Err(usage("--reconstruct needs gradients: use --integrator gpt".into()))
-            }
+            (IntegratorFlag::Pt, Some(_)) => Err(usage(
+                "--reconstruct needs gradients: use --integrator gpt, or --common-random-numbers".into(),
+            )),
         }
+    }
+
+    /// Samples a pixel; with common random numbers as many again are taken for the gradients.
+    fn samples(&self) -> u32 {
+        let stops = self.time_limit.is_some() || self.target_error.is_some();
+        let spp = self.spp.unwrap_or(if stops { MOST_SAMPLES } else { 64 });
+        if self.common_random_numbers { spp.div_ceil(2) } else { spp }
     }
 
     fn load_options(&self) -> LoadOptions {

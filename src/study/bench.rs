@@ -8,13 +8,13 @@ use crate::analyze::metrics::{self, Comparison};
 use crate::error::{Error, Result};
 use crate::film::{Film, Half, Plane};
 use crate::integrate::{self, Kind, Settings};
-use crate::reconstruct::{Input, Method, reconstruct};
-use crate::render::{Monitor, open};
+use crate::reconstruct::{Alpha, Input, Method, reconstruct};
+use crate::render::{Monitor, open, sum};
 use crate::scene::{Camera, Environment, LoadOptions, Scene};
 use crate::store::png;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Weight of the primal in the solves that have one for all pixels.
+/// Weight of the primal in the solves that have one for all pixels, as `render` has it.
 pub const ALPHA: f32 = 0.2;
 
 /// Distance of the reference's seeds from those of the methods.
@@ -31,6 +31,8 @@ pub struct Shot {
     pub render_seconds: f64,
     /// CPU time from the samples to the image, s.
     pub solve_seconds: f64,
+    /// relMSE that the solver expects; NaN where it expects nothing.
+    pub estimate: f64,
 }
 
 impl Shot {
@@ -38,12 +40,6 @@ impl Shot {
     pub fn whole(&self) -> Plane {
         sum(&self.image, &self.direct)
     }
-}
-
-/// `a` + `b`, planes of one size.
-pub fn sum(a: &Plane, b: &Plane) -> Plane {
-    let add = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| a[c] + b[c]);
-    Plane { width: a.width, height: a.height, data: a.data.iter().zip(&b.data).map(add).collect() }
 }
 
 /// What everything is held against.
@@ -141,12 +137,22 @@ impl<'a> Bench<'a> {
             direct: film.direct(),
             render_seconds: seconds,
             solve_seconds: 0.0,
+            estimate: f64::NAN,
         })
     }
 
     /// The film of gradient-domain path tracing, with the features that a solver may use.
     pub fn gradients(&self, spp: u32, seed: u64) -> Result<(Film, f64)> {
         self.film(&Settings { features: true, ..self.settings(Kind::GradientPath, spp, seed) })
+    }
+
+    /// The film of path tracing whose differences are those of a second film, in which all pixels draw the same
+    /// random numbers: twice the samples.
+    pub fn common(&self, spp: u32, seed: u64) -> Result<(Film, f64)> {
+        let settings = Settings { features: true, ..self.settings(Kind::Path, spp, seed) };
+        let (film, first) = self.film(&settings)?;
+        let (other, second) = self.film(&Settings { common_random_numbers: true, ..settings })?;
+        Ok((film.with_differences_of(&other), first + second))
     }
 
     /// The reference.
@@ -204,11 +210,12 @@ fn automatic_exposure(image: &Plane) -> f32 {
 
 /// The image of a film of gradients that took `render_seconds`.
 pub fn solve(film: &Film, method: Method, render_seconds: f64) -> Shot {
-    let (image, solve_seconds) = clock::timed(|| {
-        let (primal, dx, dy) = (film.primal(Half::Both), film.dx(Half::Both), film.dy(Half::Both));
-        reconstruct(&Input { primal: &primal, dx: &dx, dy: &dy }, method, ALPHA).image
+    let (solution, solve_seconds) = clock::timed(|| {
+        let buffers = film.buffers();
+        reconstruct(&Input::from(&buffers), method, Alpha::Fixed(ALPHA))
     });
-    Shot { image, direct: film.direct(), render_seconds, solve_seconds }
+    let estimate = solution.error.as_ref().map_or(f64::NAN, |e| e.rel_mse);
+    Shot { image: solution.image, direct: film.direct(), render_seconds, solve_seconds, estimate }
 }
 
 #[cfg(test)]

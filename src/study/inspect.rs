@@ -6,9 +6,9 @@
 use super::charts;
 use super::table::number;
 use crate::analyze::moments::{Energies, Moments, ratio_color};
-use crate::analyze::noise::{Noise, Run};
+use crate::analyze::noise::Noise;
 use crate::error::{Error, Result};
-use crate::store::{Document, atomic, exr, png};
+use crate::store::{Document, atomic, exr, layers, png};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -38,10 +38,15 @@ pub fn inspect(inputs: &[PathBuf], alpha: f32) -> Result<Inspection> {
         same_view(first, path, document)?;
     }
     let (source, runs, share) = if documents.len() == 1 {
-        let halves = ["_a", "_b"].map(|suffix| run(first_path, first, suffix));
-        ("the two halves of the samples", halves.into_iter().collect::<Result<Vec<_>>>()?, 0.5)
+        let halves = layers::buffers(first, first_path)?.halves.ok_or_else(|| Error::Scene {
+            path: first_path.clone(),
+            at: String::new(),
+            what: "has no two halves; render at least two samples a pixel".into(),
+        })?;
+        ("the two halves of the samples", halves.to_vec(), 0.5)
     } else {
-        let runs = files().map(|(path, document)| run(path, document, "")).collect::<Result<Vec<_>>>()?;
+        let runs = files().map(|(path, document)| Ok(layers::buffers(document, path)?.all));
+        let runs = runs.collect::<Result<Vec<_>>>()?;
         ("independent renders", runs, 1.0)
     };
     let noise = Noise::measure(&runs, share, alpha).ok_or_else(|| Error::Scene {
@@ -74,18 +79,6 @@ fn same_view(first: &Document, path: &Path, other: &Document) -> Result<()> {
         return Err(fault("has the first one's samples; render it with another --seed".into()));
     }
     Ok(())
-}
-
-/// The buffers of one half (`_a`, `_b`) or of the whole.
-fn run(path: &Path, document: &Document, suffix: &str) -> Result<Run> {
-    let plane = |layer: &str| {
-        document.plane(&format!("{layer}{suffix}")).ok_or_else(|| Error::Scene {
-            path: path.to_owned(),
-            at: String::new(),
-            what: format!("has no layer {layer}{suffix}; render it with --integrator gpt --buffers"),
-        })
-    };
-    Ok(Run { primal: plane("primal")?, dx: plane("dx")?, dy: plane("dy")? })
 }
 
 /// The moments, where the file has them.

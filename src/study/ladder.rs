@@ -3,10 +3,10 @@
 use super::bench::{Bench, Reference, Score, Shot, solve};
 use super::fit;
 use super::{Plan, Subject, clock};
-use crate::analyze::noise::{Noise, Run};
+use crate::analyze::noise::Noise;
 use crate::denoise;
 use crate::error::Result;
-use crate::film::{Film, Half};
+use crate::film::{Half, Measured};
 use crate::integrate::{Kind, Settings};
 use crate::reconstruct::Method;
 use crate::render::{Monitor, metadata};
@@ -24,6 +24,8 @@ pub enum Side {
     Denoised,
     /// Gradient-domain path tracing with a reconstruction.
     Gradient(Method),
+    /// Path tracing with differences by common random numbers, twice the samples, and the default reconstruction.
+    Common,
 }
 
 impl Side {
@@ -33,6 +35,7 @@ impl Side {
             Self::Path => "PT".into(),
             Self::Denoised => "PT + OIDN".into(),
             Self::Gradient(method) => format!("G-PT {}", metadata::method_name(method)),
+            Self::Common => format!("CRN {}", metadata::method_name(Method::default())),
         }
     }
 }
@@ -46,6 +49,8 @@ pub struct Cell {
     pub solve_seconds: f64,
     pub rel_mse: f64,
     pub flip: f64,
+    /// relMSE that the solver expected, mean over the seeds; NaN where it expects nothing.
+    pub estimate: f64,
     /// Mean relative difference of the image's mean from the reference's, and its standard error over the seeds.
     pub energy: (f64, f64),
     /// relMSE of path tracing with as many samples, over this one.
@@ -64,7 +69,7 @@ impl Cell {
 }
 
 /// Everything measured on one scene.
-pub struct Measured {
+pub struct Findings {
     pub name: String,
     pub triangles: u64,
     pub reference: Reference,
@@ -73,13 +78,13 @@ pub struct Measured {
     pub noise: Noise,
     /// Path tracing with the CPU time of the default method at the shown number of samples, and its samples.
     pub equal_time: (u32, Shot, Score),
-    /// Film of the shown number of samples: primal, dx, dy.
-    pub buffers: Run,
+    /// Gradient-domain path tracing at the shown number of samples: primal, dx, dy.
+    pub buffers: Measured,
     /// Least squares at the smallest number of samples with and without the weights of pairs.
     pub pair_weights: [Shot; 2],
 }
 
-impl Measured {
+impl Findings {
     /// The cell of a method.
     pub fn cell(&self, side: Side, spp: u32) -> Option<&Cell> {
         self.cells.iter().find(|c| c.side == side && c.spp == spp)
@@ -109,6 +114,7 @@ struct Tally {
     spp: u32,
     scores: Vec<Score>,
     seconds: [f64; 2],
+    estimates: f64,
     first: Shot,
 }
 
@@ -119,8 +125,16 @@ fn tally(tallies: &mut Vec<Tally>, side: Side, spp: u32, score: Score, shot: Sho
         Some(t) => {
             t.scores.push(score);
             t.seconds = [t.seconds[0] + seconds[0], t.seconds[1] + seconds[1]];
+            t.estimates += shot.estimate;
         }
-        None => tallies.push(Tally { side, spp, scores: vec![score], seconds, first: shot }),
+        None => tallies.push(Tally {
+            side,
+            spp,
+            scores: vec![score],
+            seconds,
+            estimates: shot.estimate,
+            first: shot,
+        }),
     }
 }
 
@@ -130,7 +144,7 @@ pub fn measure(
     subject: &Subject,
     monitor: &dyn Monitor,
     cancel: &AtomicBool,
-) -> Result<Measured> {
+) -> Result<Findings> {
     let bench = Bench::new(plan, subject, monitor, cancel)?;
     let reference = bench.reference()?;
     let mut tallies = Vec::new();
@@ -142,12 +156,12 @@ pub fn measure(
     bench.stage(&format!("noise at {shown} spp"));
     let mut runs = Vec::new();
     for i in 0..NOISE_RUNS {
-        runs.push(buffers(&bench.gradients(shown, plan.seed + i)?.0));
+        runs.push(bench.gradients(shown, plan.seed + i)?.0.measured(Half::Both));
     }
     let noise = Noise::measure(&runs, 1.0, super::bench::ALPHA).expect("four runs of one size");
     let equal_time = equal_time(&bench, &reference, &cells)?;
     let pair_weights = pair_weights(&bench)?;
-    Ok(Measured {
+    Ok(Findings {
         name: bench.name.clone(),
         triangles: bench.scene.triangle_count(),
         reference,
@@ -183,6 +197,8 @@ fn climb(bench: &Bench, reference: &Reference, round: u64, tallies: &mut Vec<Tal
         if !path_first {
             path(tallies)?;
         }
+        let (film, seconds) = bench.common(spp, seed)?;
+        add(tallies, Side::Common, spp, solve(&film, Method::default(), seconds));
         if denoise::AVAILABLE {
             add(tallies, Side::Denoised, spp, denoised(bench, spp, seed)?);
         }
@@ -202,7 +218,8 @@ fn denoised(bench: &Bench, spp: u32, seed: u64) -> Result<Shot> {
     let settings = Settings { features: true, ..bench.settings(Kind::Path, spp, seed) };
     let (film, render_seconds) = bench.film(&settings)?;
     let (image, solve_seconds) = clock::timed(|| denoise::primal(&film));
-    Ok(Shot { image: image?, direct: film.direct(), render_seconds, solve_seconds })
+    let (image, direct) = (image?, film.direct());
+    Ok(Shot { image, direct, render_seconds, solve_seconds, estimate: f64::NAN })
 }
 
 /// Means over the seeds, and the gains over path tracing.
@@ -210,7 +227,8 @@ fn cells(plan: &Plan, tallies: Vec<Tally>) -> Vec<Cell> {
     let order = |side: Side| match side {
         Side::Path => 0,
         Side::Denoised => 1,
-        Side::Gradient(method) => 2 + plan.methods.iter().position(|m| *m == method).unwrap_or(0),
+        Side::Common => 2,
+        Side::Gradient(method) => 3 + plan.methods.iter().position(|m| *m == method).unwrap_or(0),
     };
     let mut cells: Vec<Cell> = tallies
         .into_iter()
@@ -225,6 +243,7 @@ fn cells(plan: &Plan, tallies: Vec<Tally>) -> Vec<Cell> {
                 solve_seconds: t.seconds[1] / n,
                 rel_mse: mean(|s| s.rel_mse),
                 flip: mean(|s| s.flip),
+                estimate: t.estimates / n,
                 energy: fit::mean_and_error(&energies),
                 gain_spp: f64::NAN,
                 gain_time: f64::NAN,
@@ -268,8 +287,4 @@ fn pair_weights(bench: &Bench) -> Result<[Shot; 2]> {
         Ok(solve(&film, Method::L2, seconds))
     };
     Ok([shot(true)?, shot(false)?])
-}
-
-fn buffers(film: &Film) -> Run {
-    Run { primal: film.primal(Half::Both), dx: film.dx(Half::Both), dy: film.dy(Half::Both) }
 }

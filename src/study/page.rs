@@ -1,7 +1,7 @@
 //! The page: one HTML file with its style, script, pictures and charts inside (`templates/study.*`).
 
 use super::charts;
-use super::ladder::{Measured, Side};
+use super::ladder::{Findings, Side};
 use super::pictures::{self, Group};
 use super::report::Tables;
 use super::table::Table;
@@ -48,7 +48,7 @@ struct Page<'a> {
 }
 
 /// The text of the page.
-pub fn html(plan: &Plan, results: &[Measured], tables: &[Tables], summary: Table) -> Result<String> {
+pub fn html(plan: &Plan, results: &[Findings], tables: &[Tables], summary: Table) -> Result<String> {
     let sections = results.iter().zip(tables).enumerate();
     let sections = sections.map(|(i, (m, t))| section(plan, m, t, i)).collect::<Result<Vec<_>>>()?;
     let page = Page { facts: facts(plan), shown: plan.shown_spp(), summary, sections };
@@ -72,7 +72,7 @@ fn facts(plan: &Plan) -> Vec<(&'static str, String)> {
     ]
 }
 
-fn section<'a>(plan: &Plan, measured: &'a Measured, tables: &'a Tables, index: usize) -> Result<Section<'a>> {
+fn section<'a>(plan: &Plan, measured: &'a Findings, tables: &'a Tables, index: usize) -> Result<Section<'a>> {
     let groups = pictures::groups(plan, measured, index)?;
     // The wipe starts with path tracing and ours at the shown number of samples: the ladder is the first group, of
     // pairs.
@@ -97,7 +97,7 @@ fn section<'a>(plan: &Plan, measured: &'a Measured, tables: &'a Tables, index: u
 }
 
 /// What came out, good and bad, in two sentences.
-fn verdict(plan: &Plan, measured: &Measured) -> String {
+fn verdict(plan: &Plan, measured: &Findings) -> String {
     let (shown, best) = (plan.shown_spp(), Side::Gradient(Method::default()));
     let mut text = String::new();
     if let Some(cell) = measured.cell(best, shown) {
@@ -125,7 +125,7 @@ fn verdict(plan: &Plan, measured: &Measured) -> String {
 /// A value of a method's curve: samples, CPU seconds, relMSE, FLIP.
 type Pick = fn(&(f64, f64, f64, f64)) -> f64;
 
-fn curves(measured: &Measured, x: (&'static str, Pick), y: (&'static str, Pick)) -> Chart {
+fn curves(measured: &Findings, x: (&'static str, Pick), y: (&'static str, Pick)) -> Chart {
     let series = measured.sides().into_iter().enumerate().map(|(color, side)| {
         let points: Vec<(f64, f64)> = measured.curve(side).iter().map(|p| (x.1(p), y.1(p))).collect();
         let slope = fit::slope(&points);
@@ -137,7 +137,7 @@ fn curves(measured: &Measured, x: (&'static str, Pick), y: (&'static str, Pick))
     Chart { x: x.0, y: y.0, x_scale: Scale::Log, y_scale: Scale::Log, series: series.collect() }
 }
 
-fn drawn(measured: &Measured) -> Vec<Drawn> {
+fn drawn(measured: &Findings) -> Vec<Drawn> {
     let (spp, seconds) = (("samples a pixel", (|p| p.0) as Pick), ("CPU seconds", (|p| p.1) as Pick));
     let (error, flip) = (("relMSE", (|p| p.2) as Pick), ("FLIP", (|p| p.3) as Pick));
     vec![

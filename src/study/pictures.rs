@@ -1,13 +1,13 @@
 //! The pictures of a scene: each once, with a name and a description, as PNG inside the page.
 
 use super::Plan;
-use super::bench::sum;
-use super::ladder::{Measured, Side};
+use super::ladder::{Findings, Side};
 use super::table::number;
 use crate::analyze::metrics::pixel_rel_mse;
 use crate::error::{Error, Result};
 use crate::film::Plane;
 use crate::reconstruct::Method;
+use crate::render::sum;
 use crate::store::png;
 use base64::Engine;
 use std::path::Path;
@@ -43,7 +43,7 @@ pub struct Group {
 /// Makes pictures of one scene.
 struct Studio<'a> {
     plan: &'a Plan,
-    measured: &'a Measured,
+    measured: &'a Findings,
     prefix: String,
     count: usize,
 }
@@ -82,7 +82,7 @@ impl Studio<'_> {
     }
 
     fn reference(&mut self) -> Result<Picture> {
-        let Measured { reference, .. } = self.measured;
+        let Findings { reference, .. } = self.measured;
         let size = [reference.image.width, reference.image.height];
         let label = format!("reference, {} spp", self.plan.reference_spp);
         let alt = format!("{}, the reference", self.measured.name);
@@ -100,7 +100,7 @@ fn signed(plane: &Plane) -> Vec<u8> {
 }
 
 /// All groups of a scene; `index` makes the ids unique.
-pub fn groups(plan: &Plan, measured: &Measured, index: usize) -> Result<Vec<Group>> {
+pub fn groups(plan: &Plan, measured: &Findings, index: usize) -> Result<Vec<Group>> {
     let mut studio = Studio { plan, measured, prefix: format!("p{index}"), count: 0 };
     let best = Side::Gradient(Method::default());
     let shown = plan.shown_spp();

@@ -3,7 +3,7 @@
 use super::Plan;
 use super::charts;
 use super::fit;
-use super::ladder::{Measured, Side};
+use super::ladder::{Findings, Side};
 use super::page;
 use super::table::{Table, number};
 use crate::error::Result;
@@ -25,7 +25,7 @@ pub struct Tables {
 }
 
 impl Tables {
-    pub fn of(plan: &Plan, measured: &Measured) -> Self {
+    pub fn of(plan: &Plan, measured: &Findings) -> Self {
         Self {
             results: results(measured),
             methods: methods(measured),
@@ -37,7 +37,7 @@ impl Tables {
 }
 
 /// Every method at every number of samples.
-fn results(measured: &Measured) -> Table {
+fn results(measured: &Findings) -> Table {
     let mut table = Table::new(&[
         "method",
         "spp",
@@ -45,6 +45,7 @@ fn results(measured: &Measured) -> Table {
         "solve_cpu_s",
         "rel_mse",
         "flip",
+        "estimated_rel_mse",
         "gain_equal_spp",
         "gain_equal_time",
         "energy_percent",
@@ -58,6 +59,7 @@ fn results(measured: &Measured) -> Table {
             cell.solve_seconds,
             cell.rel_mse,
             cell.flip,
+            cell.estimate,
             cell.gain_spp,
             cell.gain_time,
             100.0 * energy,
@@ -70,7 +72,7 @@ fn results(measured: &Measured) -> Table {
 }
 
 /// How each method's error falls, and from where on it beats the denoiser at equal time.
-fn methods(measured: &Measured) -> Table {
+fn methods(measured: &Findings) -> Table {
     let mut table = Table::new(&["method", "slope_of_rel_mse_over_spp"]);
     let over_time = |side: Side| -> Vec<(f64, f64)> {
         measured.curve(side).into_iter().map(|(_, seconds, error, _)| (seconds, error)).collect()
@@ -97,7 +99,7 @@ fn methods(measured: &Measured) -> Table {
 }
 
 /// What holds for the scene as a whole, as (name, value).
-fn facts(plan: &Plan, measured: &Measured) -> Table {
+fn facts(plan: &Plan, measured: &Findings) -> Table {
     let [width, height] = plan.size;
     let most = plan.spp.last().copied().unwrap_or(1);
     let samples = f64::from(most) * f64::from(width) * f64::from(height);
@@ -124,13 +126,13 @@ fn facts(plan: &Plan, measured: &Measured) -> Table {
 }
 
 /// Equal-time gains of every method on every scene, at the shown number of samples.
-pub fn summary(plan: &Plan, results: &[Measured]) -> Table {
+pub fn summary(plan: &Plan, results: &[Findings]) -> Table {
     let shown = plan.shown_spp();
     let mut table = Table::new(&["method"]);
     table.header.extend(results.iter().map(|m| m.name.clone()));
     table.header.push("geometric mean".into());
-    for side in results.first().map(Measured::sides).unwrap_or_default() {
-        let gain = |m: &Measured| m.cell(side, shown).map_or(f64::NAN, |c| c.gain_time);
+    for side in results.first().map(Findings::sides).unwrap_or_default() {
+        let gain = |m: &Findings| m.cell(side, shown).map_or(f64::NAN, |c| c.gain_time);
         let gains: Vec<f64> = results.iter().map(gain).collect();
         let mut row = vec![side.name()];
         row.extend(gains.iter().map(|g| number(*g)));
@@ -157,7 +159,7 @@ fn joined<'a>(parts: impl Iterator<Item = (&'a str, &'a Table)>) -> Table {
 }
 
 /// Writes everything; returns the paths.
-pub fn write(plan: &Plan, results: &[Measured], folder: &Path) -> Result<Vec<PathBuf>> {
+pub fn write(plan: &Plan, results: &[Findings], folder: &Path) -> Result<Vec<PathBuf>> {
     let tables: Vec<Tables> = results.iter().map(|m| Tables::of(plan, m)).collect();
     let names: Vec<&str> = results.iter().map(|m| m.name.as_str()).collect();
     let all = |pick: fn(&Tables) -> &Table| joined(names.iter().copied().zip(tables.iter().map(pick))).csv();

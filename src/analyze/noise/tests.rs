@@ -34,11 +34,11 @@ pub(in crate::analyze) fn difference(image: &Plane, step: (usize, usize)) -> Pla
     })
 }
 
-fn runs(width: usize, height: usize, primal: f64, gradient: f64, count: u32) -> Vec<Run> {
+fn runs(width: usize, height: usize, primal: f64, gradient: f64, count: u32) -> Vec<Measured> {
     let image = signal(width, height);
     let (dx, dy) = (difference(&image, (1, 0)), difference(&image, (0, 1)));
     (0..count)
-        .map(|i| Run {
+        .map(|i| Measured {
             primal: sum(&image, &noise(width, height, primal, 3 * i)),
             dx: sum(&dx, &noise(width, height, gradient, 3 * i + 1)),
             dy: sum(&dy, &noise(width, height, gradient, 3 * i + 2)),
