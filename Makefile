@@ -11,10 +11,10 @@ demo:
 	mkdir -p out
 	target/release/gdpt render builtin:cornell-box -o out/cornell-box.exr -o out/cornell-box.png
 
-# Installs what is missing and runs every test.
+# Installs what is missing and runs every test; where OIDN_DIR is set, those of the denoiser too.
 test:
-	./setup
-	cargo test --release --workspace
+	./setup --browser
+	cargo test --release --workspace $(if $(OIDN_DIR),--features denoise)
 
 # Criterion benches, their pages in target/criterion/, then one table of ratios and targets, also in target/bench.md.
 # One row again: cargo bench --bench table -- NAME [--quick]; the names: cargo bench --bench table -- --list
@@ -25,13 +25,13 @@ bench:
 
 # Every bench once, then ratios and counted instructions against benches/expected.toml; fails out of band.
 bench-ci:
-	./setup bench
+	./setup --bench
 	cargo bench -- --test
 	cargo bench --bench ci
 
 # Stores what is measured now as what bench-ci compares with.
 bench-record:
-	./setup bench
+	./setup --bench
 	cargo bench --bench ci -- --record
 
 # Time and memory as the work grows: plots and exponents in target/bench-scaling/.

@@ -8,6 +8,11 @@ fn main() {
     if !lib_dir.is_empty() {
         println!("cargo::rustc-link-arg=-Wl,-rpath,{lib_dir}");
     }
+    // The denoiser's library is found where it was linked from; one of the system by the loader itself.
+    println!("cargo::rerun-if-env-changed=OIDN_DIR");
+    if let (Ok(_), Ok(folder)) = (std::env::var("CARGO_FEATURE_DENOISE"), std::env::var("OIDN_DIR")) {
+        println!("cargo::rustc-link-arg=-Wl,-rpath,{folder}/lib");
+    }
     let version = std::env::var("DEP_EMBREE4_SAFE_VERSION").expect("embree4 sets version");
     println!("cargo::rustc-env=GDPT_EMBREE_HEADERS={version}");
     let features = std::env::var("CARGO_CFG_TARGET_FEATURE").unwrap_or_default();

@@ -9,6 +9,7 @@
 pub mod accel;
 pub mod analyze;
 pub mod cli;
+pub mod denoise;
 pub mod error;
 pub mod film;
 pub mod integrate;
@@ -19,3 +20,4 @@ pub mod render;
 pub mod scene;
 pub mod shade;
 pub mod store;
+pub mod study;

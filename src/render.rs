@@ -3,21 +3,23 @@
 
 pub mod job;
 pub mod metadata;
+mod passes;
 mod prepare;
 pub mod resolve;
 
-pub use self::job::{Backend, CameraChoice, EnvironmentOptions, Format, Job, Lens, Output, Source};
+pub use self::job::{Backend, CameraChoice, EnvironmentOptions, Format, Job, Lens, Output, Source, Stop};
 pub use self::prepare::open;
 use self::prepare::{check_memory, load};
 
 use crate::accel::embree::flush_denormals;
 use crate::accel::{Accel, EmbreeAccel, ObvhsAccel};
+use crate::denoise;
 use crate::error::{Error, Result};
-use crate::film::{Film, Half, Plane};
-use crate::integrate::{self, Statistics};
-use crate::reconstruct::{Input, Method, reconstruct};
+use crate::film::{Buffers, Film, Half, Plane};
+use crate::integrate::{self, Settings, Statistics};
+use crate::reconstruct::{Alpha, Input, Method, Solution, reconstruct};
 use crate::scene::{Camera, LoadReport, Scene};
-use crate::store::{Window, atomic, exr, layers, png};
+use crate::store::{Document, Window, atomic, exr, layers, png};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -54,6 +56,37 @@ impl Seconds {
     }
 }
 
+/// How an image was found, without the image.
+#[derive(Clone, Copy, Debug)]
+pub struct Solve {
+    /// The method, `auto` resolved.
+    pub method: Method,
+    /// α, where the method has one.
+    pub alpha: Option<f32>,
+    /// Relative residual.
+    pub residual: f64,
+    /// Steps or reweightings.
+    pub iterations: usize,
+    /// Measurements the solve did without because they were not finite.
+    pub missing: usize,
+    /// Estimated relMSE of the image; `None` below two samples.
+    pub rel_mse: Option<f64>,
+}
+
+impl Solve {
+    fn of(solution: &Solution) -> Self {
+        let Solution { method, alpha, residual, iterations, missing, error, .. } = solution;
+        Self {
+            method: *method,
+            alpha: *alpha,
+            residual: *residual,
+            iterations: *iterations,
+            missing: *missing,
+            rel_mse: error.as_ref().map(|e| e.rel_mse),
+        }
+    }
+}
+
 /// What a finished render has to say.
 #[derive(Clone, Debug)]
 pub struct Report {
@@ -67,17 +100,14 @@ pub struct Report {
     pub size: [u32; 2],
     /// Triangles over all instances.
     pub triangles: u64,
+    /// Samples a pixel, fewer than asked for where the job was to stop.
+    pub spp: u32,
     /// Samples over all pixels.
     pub samples: u64,
-    /// Root of the variance of the mean primal, averaged over pixels and channels, W·m⁻²·sr⁻¹; `None` below two
-    /// samples.
-    pub error_estimate: Option<f64>,
-    /// Relative residual of the solve; `None` without one.
-    pub residual: Option<f64>,
+    /// How the image was found.
+    pub solve: Solve,
     /// Samples dropped because they were not finite.
     pub dropped_samples: u64,
-    /// Measurements the solve did without because they were not finite.
-    pub missing: usize,
     /// Threads that worked.
     pub threads: usize,
 }
@@ -85,11 +115,11 @@ pub struct Report {
 /// Renders `job`. When `cancel` becomes true the run ends with [`Error::Interrupted`] and writes nothing; its
 /// signal number is for the caller to fill in.
 pub fn run(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Report> {
-    for output in &job.outputs {
+    for output in job.outputs.iter().chain(&job.denoised) {
         atomic::probe(&output.path, &job.inputs())?;
     }
     check_memory(job)?;
-    let work = Work { job, monitor, cancel, pool: pool(job.threads)? };
+    let work = Work { job, monitor, cancel, pool: pool(job.threads)?, start: Instant::now() };
     let mut seconds = Seconds::default();
 
     monitor.stage("load");
@@ -110,12 +140,13 @@ pub fn run(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Repo
     let (film, statistics) = rendered?;
 
     monitor.stage("reconstruct");
-    let (solved, time) = timed(|| work.pool.install(|| solve(&film, job.method, job.alpha)));
+    let (solved, time) = timed(|| work.pool.install(|| solve(&film.buffers(), job.method, job.alpha)));
     seconds.reconstruct = time;
     work.go_on()?;
 
     monitor.stage("write");
-    let (written, time) = timed(|| work.pool.install(|| write(job, &film, &camera, &solved)));
+    let done = job.with_samples(film.samples(Half::Both));
+    let (written, time) = timed(|| work.pool.install(|| write(&done, &film, &camera, &solved)));
     written?;
     seconds.write = time;
 
@@ -125,17 +156,16 @@ pub fn run(job: &Job, monitor: &dyn Monitor, cancel: &AtomicBool) -> Result<Repo
         load: scene.report.clone(),
         size: [film.width as u32, film.height as u32],
         triangles: scene.triangle_count(),
-        samples: film.width as u64 * film.height as u64 * u64::from(film.samples(Half::Both)),
-        error_estimate: error_estimate(&film),
-        residual: solved.residual,
+        spp: done.settings.spp,
+        samples: film.width as u64 * film.height as u64 * u64::from(done.settings.samples_taken()),
+        solve: Solve::of(&solved.solution),
         dropped_samples: film.dropped_samples,
-        missing: solved.missing,
         threads: job.threads,
     })
 }
 
 /// Workers that flush denormals to zero: they are slow, and darker than any image.
-fn pool(threads: usize) -> Result<ThreadPool> {
+pub(crate) fn pool(threads: usize) -> Result<ThreadPool> {
     ThreadPoolBuilder::new()
         .num_threads(threads)
         .start_handler(|_| flush_denormals())
@@ -149,6 +179,7 @@ struct Work<'a> {
     monitor: &'a dyn Monitor,
     cancel: &'a AtomicBool,
     pool: ThreadPool,
+    start: Instant,
 }
 
 impl Work<'_> {
@@ -171,14 +202,61 @@ impl Work<'_> {
         seconds.build = time;
         self.go_on()?;
 
-        self.monitor.stage("render");
-        let settings = &self.job.settings;
-        let on_progress = |done, total| self.monitor.progress(done, total);
-        let integrate = || integrate::run(scene, &accel, camera, settings, &on_progress, self.cancel);
-        let (result, time) = timed(|| self.pool.install(integrate));
+        let (settings, stop) = (&self.job.settings, &self.job.stop);
+        let mut renderer = Renderer { work: self, scene, accel: &accel, camera };
+        let (result, time) = timed(|| passes::run(settings, stop, self.start, &mut renderer));
         seconds.render = time;
         self.go_on()?;
-        Ok(result)
+        result.ok_or(Error::Interrupted(0))
+    }
+}
+
+/// A scene before one backend.
+struct Renderer<'a, A> {
+    work: &'a Work<'a>,
+    scene: &'a Scene,
+    accel: &'a A,
+    camera: &'a Camera,
+}
+
+impl<A: Accel> Renderer<'_, A> {
+    /// Integrates; the work is part `part` of `parts`.
+    fn integrate(&self, settings: &Settings, part: u64, parts: u64) -> (Film, Statistics) {
+        let &Work { monitor, cancel, start, job, .. } = self.work;
+        let on_progress = |done: u64, total: u64| match job.stop.seconds {
+            Some(limit) => {
+                let milliseconds = |seconds: f64| (1e3 * seconds) as u64;
+                monitor.progress(milliseconds(start.elapsed().as_secs_f64().min(limit)), milliseconds(limit));
+            }
+            None => monitor.progress(part * total + done, parts * total),
+        };
+        let run = || integrate::run(self.scene, self.accel, self.camera, settings, &on_progress, cancel);
+        self.work.pool.install(run)
+    }
+}
+
+impl<A: Accel> passes::Passes for Renderer<'_, A> {
+    fn pass(&mut self, settings: &Settings) -> Option<(Film, Statistics)> {
+        if self.work.job.stop.seconds.is_none()
+            || settings.first_sample == self.work.job.settings.first_sample
+        {
+            self.work.monitor.stage("render");
+        }
+        let common = settings.common_random_numbers;
+        let own = Settings { common_random_numbers: false, ..*settings };
+        let (mut film, mut statistics) = self.integrate(&own, 0, if common { 2 } else { 1 });
+        if common {
+            let (other, more) = self.integrate(settings, 1, 2);
+            film = film.with_differences_of(&other);
+            statistics.add(&more);
+        }
+        self.work.go_on().ok().map(|()| (film, statistics))
+    }
+
+    fn trial(&mut self, film: &Film) -> Option<f64> {
+        let job = self.work.job;
+        let solved = self.work.pool.install(|| solve(&film.buffers(), job.method, job.alpha));
+        Solve::of(&solved.solution).rel_mse
     }
 }
 
@@ -196,83 +274,66 @@ fn go_on(cancel: &AtomicBool) -> Result<()> {
 /// Fails where the job is strict and its render left something out; the images are written nevertheless.
 pub fn check_strict(job: &Job, report: &Report) -> Result<()> {
     let dropped = report.dropped_samples;
-    if job.strict && (dropped > 0 || report.missing > 0) {
-        let what = format!("{dropped} samples dropped, {} measurements missing", report.missing);
+    if job.strict && (dropped > 0 || report.solve.missing > 0) {
+        let what = format!("{dropped} samples dropped, {} measurements missing", report.solve.missing);
         return Err(prepare::strict(job, &what));
     }
     Ok(())
 }
 
-/// The finished image and how well it solves its equations.
+/// The finished image and how it was found.
 #[derive(Clone, Debug)]
 pub struct Solved {
     /// Very direct light included.
     pub image: Plane,
-    /// Relative residual; `None` where nothing was solved.
-    pub residual: Option<f64>,
-    /// Measurements that were not finite and had no say.
-    pub missing: usize,
+    /// How the image without it was found.
+    pub solution: Solution,
 }
 
-/// The image of a film: solved for, or primal plus very direct light.
-fn solve(film: &Film, method: Method, alpha: f32) -> Solved {
-    let both = Half::Both;
-    if film.has_gradients {
-        solve_planes(&film.primal(both), &film.dx(both), &film.dy(both), &film.direct(), method, alpha)
-    } else {
-        Solved { image: sum(&film.primal(both), &film.direct()), residual: None, missing: 0 }
-    }
+/// The image of a film's means: solved for, or the primal, plus very direct light.
+fn solve(buffers: &Buffers, method: Method, alpha: Alpha) -> Solved {
+    let solution = reconstruct(&Input::from(buffers), method, alpha);
+    Solved { image: sum(&solution.image, &buffers.direct), solution }
 }
 
-/// The image of buffers.
-fn solve_planes(
-    primal: &Plane,
-    dx: &Plane,
-    dy: &Plane,
-    direct: &Plane,
-    method: Method,
-    alpha: f32,
-) -> Solved {
-    if method == Method::None {
-        return Solved { image: sum(primal, direct), residual: None, missing: 0 };
-    }
-    let solution = reconstruct(&Input { primal, dx, dy }, method, alpha);
-    Solved {
-        image: sum(&solution.image, direct),
-        residual: Some(solution.residual),
-        missing: solution.missing,
-    }
-}
-
-fn sum(a: &Plane, b: &Plane) -> Plane {
+/// `a` + `b`, planes of one size.
+pub(crate) fn sum(a: &Plane, b: &Plane) -> Plane {
     let add = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| a[c] + b[c]);
     Plane { width: a.width, height: a.height, data: a.data.iter().zip(&b.data).map(add).collect() }
 }
 
-/// Root of the mean variance of the primal.
-fn error_estimate(film: &Film) -> Option<f64> {
-    let variance = film.variance();
-    let sum: f64 = variance.data.iter().flatten().map(|&v| f64::from(v)).sum();
-    (film.samples(Half::Both) > 1).then(|| (sum / (3 * variance.data.len()).max(1) as f64).sqrt())
-}
-
 fn write(job: &Job, film: &Film, camera: &Camera, solved: &Solved) -> Result<()> {
     for output in &job.outputs {
-        match output.format {
-            Format::Png => png::write(&output.path, &solved.image, job.exposure, job.tone_map)?,
-            Format::Exr => {
-                let mut document =
-                    layers::document(film, &solved.image, &job.layers, job.buffers, !job.background);
-                let settings = &job.settings;
-                document.window = settings
-                    .crop
-                    .map(|[x0, y0, ..]| Window { full: [settings.width, settings.height], origin: [x0, y0] });
-                metadata::set_camera(&mut document, camera, settings.width, settings.height);
-                metadata::set_job(&mut document, job)?;
-                metadata::set_solve(&mut document, job.method, job.alpha, solved.residual);
-                exr::write(&output.path, &document)?;
-            }
-        }
+        write_image(job, film, camera, output, &solved.image, |document| {
+            metadata::set_solve(document, &Solve::of(&solved.solution));
+        })?;
+    }
+    if let Some(output) = &job.denoised {
+        let image = sum(&denoise::primal(film)?, &film.direct());
+        write_image(job, film, camera, output, &image, metadata::set_denoised)?;
     }
     Ok(())
+}
+
+/// Writes one image; `set_origin` says in its metadata how it was found.
+fn write_image(
+    job: &Job,
+    film: &Film,
+    camera: &Camera,
+    output: &Output,
+    image: &Plane,
+    set_origin: impl FnOnce(&mut Document),
+) -> Result<()> {
+    if output.format == Format::Png {
+        return png::write(&output.path, image, job.exposure, job.tone_map);
+    }
+    let mut document = layers::document(film, image, &job.layers, job.buffers, !job.background);
+    let settings = &job.settings;
+    document.window = settings
+        .crop
+        .map(|[x0, y0, ..]| Window { full: [settings.width, settings.height], origin: [x0, y0] });
+    metadata::set_camera(&mut document, camera, settings.width, settings.height);
+    metadata::set_job(&mut document, job)?;
+    set_origin(&mut document);
+    exr::write(&output.path, &document)
 }

@@ -231,6 +231,8 @@ fn help_has_examples_and_goes_to_stdout() {
         &["render", "--help"],
         &["reconstruct", "--help"],
         &["compare", "--help"],
+        &["analyze", "--help"],
+        &["study", "--help"],
         &["info", "--help"],
     ] {
         let output = gdpt(folder.path(), command);
@@ -384,13 +386,17 @@ fn compare_measures_and_refuses() {
     };
     let same = json("a.exr", "a.exr");
     assert_eq!((&same["rel_mse"], &same["mse"], &same["nan_pixels"]), (&0.0.into(), &0.0.into(), &0.into()));
+    assert_eq!((&same["flip"], &same["tonemap"]), (&0.0.into(), &"agx".into()));
     let other = json("a.exr", "b.exr");
-    for name in ["rel_mse", "mse", "psnr", "mean_test", "mean_reference"] {
+    for name in ["rel_mse", "mse", "psnr", "flip", "mean_test", "mean_reference"] {
         assert!(other[name].as_f64().is_some_and(|v| v > 0.0), "{name} is {}", other[name]);
     }
     assert_eq!(image::open(path.join("h.png")).expect("a PNG").width(), 32);
     let text = String::from_utf8(gdpt(path, &["compare", "a.exr", "b.exr"]).stdout).expect("text");
-    assert!(text.contains("relMSE") && text.contains("0.001"), "no definition beside the number: {text}");
+    assert!(
+        text.contains("relMSE") && text.contains("0.001") && text.contains("agx at +0 EV"),
+        "no definition beside the number: {text}"
+    );
     fs::write(path.join("junk.exr"), b"junk").expect("writable");
     assert_refused(&gdpt(path, &["compare", "a.exr", "small.exr"]), 65, &["32x24", "16x16"], "size");
     assert_refused(&gdpt(path, &["compare", "a.exr", "none.exr"]), 66, &["none.exr"], "missing");

@@ -5,6 +5,7 @@ use gdpt::film::{Film, Half};
 use gdpt::integrate::{Kind, Settings};
 use gdpt::reconstruct::{Input, Method, reconstruct};
 use gdpt::scene::{Scene, builtin};
+use gdpt_bench::kernels::ALPHA;
 use gdpt_bench::measure::{Cost, peak_memory, timed};
 use gdpt_bench::render::{cpus, pool, render, settings};
 use gdpt_bench::shapes;
@@ -137,9 +138,8 @@ fn measure(scene: &Scene, settings: Settings, threads: usize, x: f64) -> Point {
 }
 
 fn solve(film: &Film) -> Cost {
-    let [primal, dx, dy] = [film.primal(Half::Both), film.dx(Half::Both), film.dy(Half::Both)];
-    let input = Input { primal: &primal, dx: &dx, dy: &dy };
-    timed(|| reconstruct(&input, Method::L1, 0.2)).1
+    let measured = film.measured(Half::Both);
+    timed(|| reconstruct(&Input::new(&measured), Method::L1, ALPHA)).1
 }
 
 /// Variance of one sample, averaged over the image, over the squared mean of the image.

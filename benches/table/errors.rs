@@ -6,7 +6,7 @@ use gdpt::analyze::metrics::compare;
 use gdpt::film::{Half, Plane};
 use gdpt::integrate::Kind;
 use gdpt::reconstruct::{Input, reconstruct};
-use gdpt_bench::kernels::SOLVERS;
+use gdpt_bench::kernels::{ALPHA, SOLVERS};
 use gdpt_bench::measure::{Cost, median, timed};
 use gdpt_bench::render::{Backend, Bed, cpus, pool, settings};
 use gdpt_bench::scenes;
@@ -65,10 +65,10 @@ pub fn rows(name: &'static str, effort: &Effort) -> Vec<Row> {
         let (film, path) = render(Kind::Path);
         let mut round = vec![(path.cpu, reference.error(&film.primal(Half::Both)))];
         let (film, gradient) = render(Kind::GradientPath);
-        let [primal, dx, dy] = [film.primal(Half::Both), film.dx(Half::Both), film.dy(Half::Both)];
-        let input = Input { primal: &primal, dx: &dx, dy: &dy };
+        let buffers = film.buffers();
+        let input = Input::from(&buffers);
         for (_, method) in SOLVERS {
-            let (solution, Cost { cpu, .. }) = pool.install(|| timed(|| reconstruct(&input, method, 0.2)));
+            let (solution, Cost { cpu, .. }) = pool.install(|| timed(|| reconstruct(&input, method, ALPHA)));
             round.push((gradient.cpu + cpu, reference.error(&solution.image)));
         }
         measured.push(round);

@@ -3,8 +3,8 @@
 use super::Effort;
 use gdpt::film::Film;
 use gdpt::reconstruct::{Input, reconstruct};
-use gdpt_bench::fixtures::noisy_planes;
-use gdpt_bench::kernels::SOLVERS;
+use gdpt_bench::fixtures::noisy_buffers;
+use gdpt_bench::kernels::{ALPHA, SOLVERS};
 use gdpt_bench::measure::{median, peak_memory, resident_memory};
 use gdpt_bench::scenes::{self, BenchScene};
 use gdpt_bench::table::{Row, Target};
@@ -40,8 +40,8 @@ pub fn child(name: &str) -> io::Result<()> {
         drop(film);
     } else {
         let (_, method) = SOLVERS.into_iter().find(|solver| solver.0 == what).ok_or_else(usage)?;
-        let [primal, dx, dy] = noisy_planes(width, height);
-        black_box(reconstruct(&Input { primal: &primal, dx: &dx, dy: &dy }, method, 0.2));
+        let buffers = noisy_buffers(width, height);
+        black_box(reconstruct(&Input::from(&buffers), method, ALPHA));
         println!("{}", (memory(peak_memory())? - before) / (pixels * 3.0 * size_of::<[f32; 3]>() as f64));
     }
     Ok(())

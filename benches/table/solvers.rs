@@ -2,8 +2,8 @@
 
 use super::{Effort, process};
 use gdpt::reconstruct::{Input, reconstruct};
-use gdpt_bench::fixtures::noisy_planes;
-use gdpt_bench::kernels::SOLVERS;
+use gdpt_bench::fixtures::noisy_buffers;
+use gdpt_bench::kernels::{ALPHA, SOLVERS};
 use gdpt_bench::measure::{Rounds, Side, cost};
 use gdpt_bench::render::{cpus, pool};
 use gdpt_bench::table::{Row, Target, seconds};
@@ -13,19 +13,18 @@ fn target(solver: &str) -> Target {
     match solver {
         "L2" => Target::AtMost(0.15),
         "L1" => Target::AtMost(1.5),
+        "weighted" => Target::AtMost(1.0),
         _ => Target::None,
     }
 }
 
 pub fn rows(effort: &Effort) -> Vec<Row> {
     let [width, height] = effort.size([1920, 1080]);
-    let planes = noisy_planes(width as usize, height as usize);
+    let buffers = noisy_buffers(width as usize, height as usize);
     let pool = pool(cpus());
     let sides = SOLVERS.map(|(_, method)| -> Side<'_> {
-        let [primal, dx, dy] = &planes;
-        let input = Input { primal, dx, dy };
-        let pool = &pool;
-        Box::new(move || pool.install(|| cost(|| reconstruct(&input, method, 0.2))))
+        let (input, pool) = (Input::from(&buffers), &pool);
+        Box::new(move || pool.install(|| cost(|| reconstruct(&input, method, ALPHA))))
     });
     let rounds = Rounds::alternate(effort.rounds, sides.into());
     let mut rows = Vec::new();

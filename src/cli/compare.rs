@@ -1,6 +1,8 @@
 //! `gdpt compare`: the error of an image against a reference.
 
+use super::flags::DisplayFlags;
 use super::terminal;
+use crate::analyze::flip;
 use crate::analyze::metrics::{self, Comparison};
 use crate::error::{Error, Result};
 use crate::film::Plane;
@@ -17,7 +19,8 @@ Examples:
   gdpt compare test.exr reference.exr --heatmap error.png
 
 relMSE is the mean over pixels and channels of (T - R)^2 / (mean(R)^2 + 0.001), where mean(R) is the mean of the
-three channels of the reference's pixel.";
+three channels of the reference's pixel. FLIP is LDR-FLIP (0 equal, 1 most different) of the pictures that render
+would write as PNG, at --exposure and with --tonemap: it judges what is seen, and depends on both.";
 
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
@@ -34,6 +37,19 @@ pub struct Flags {
     /// Writes the relative error of each pixel as a picture: black 0, through red and yellow, white 1 and more
     #[arg(long, value_name = "FILE.png", value_parser = png_name)]
     heatmap: Option<PathBuf>,
+    #[command(flatten)]
+    display: DisplayFlags,
+}
+
+/// The object of `--json`; what is not finite (PSNR of equal images) is null.
+#[derive(serde::Serialize)]
+struct Report {
+    #[serde(flatten)]
+    metrics: Comparison,
+    /// Mean LDR-FLIP of the pictures at `exposure` with `tonemap`.
+    flip: f64,
+    exposure: f32,
+    tonemap: &'static str,
 }
 
 fn png_name(text: &str) -> std::result::Result<PathBuf, String> {
@@ -48,7 +64,7 @@ pub fn run(flags: &Flags) -> Result<()> {
     }
     let (test, reference) = (image(&flags.test)?, image(&flags.reference)?);
     let size = |p: &Plane| format!("{}x{}", p.width, p.height);
-    let metrics = metrics::compare(&test, &reference).ok_or_else(|| Error::Scene {
+    let different = || Error::Scene {
         path: flags.test.clone(),
         at: String::new(),
         what: format!(
@@ -57,11 +73,16 @@ pub fn run(flags: &Flags) -> Result<()> {
             flags.reference.display(),
             size(&reference)
         ),
-    })?;
+    };
+    let metrics = metrics::compare(&test, &reference).ok_or_else(different)?;
+    let (exposure, tone_map) = flags.display.typed();
+    let [seen, wanted] = [&test, &reference].map(|plane| png::rgb8(plane, exposure, tone_map));
+    let flip = flip::mean(&seen, &wanted, test.width, test.height).ok_or_else(different)?;
+    let report = Report { metrics, flip, exposure, tonemap: tone_map.name() };
     if let Some(path) = &flags.heatmap {
         png::write(path, &heatmap(&test, &reference), 0.0, ToneMap::None)?;
     }
-    terminal::print(&if flags.json { json(&metrics) } else { text(&metrics) });
+    terminal::print(&if flags.json { json(&report) } else { text(&report) });
     Ok(())
 }
 
@@ -73,13 +94,13 @@ fn image(path: &Path) -> Result<Plane> {
     })
 }
 
-/// The object of `--json`; what is not finite (PSNR of equal images) is null.
-fn json(m: &Comparison) -> String {
-    let object = serde_json::to_string_pretty(m).expect("numbers by name are always JSON");
+fn json(report: &Report) -> String {
+    let object = serde_json::to_string_pretty(report).expect("numbers by name are always JSON");
     format!("{object}\n")
 }
 
-fn text(m: &Comparison) -> String {
+fn text(report: &Report) -> String {
+    let m = &report.metrics;
     let mut text = String::new();
     let mut row = |name: &str, value: String| {
         writeln!(text, "{name:<15}{value}").expect("a string grows");
@@ -87,6 +108,11 @@ fn text(m: &Comparison) -> String {
     row("relMSE", format!("{:.6e}  mean of (T - R)^2 / (mean(R)^2 + 0.001)", m.rel_mse));
     row("MSE", format!("{:.6e}  mean of (T - R)^2", m.mse));
     row("PSNR", format!("{:.2} dB  10 log10(P^2 / MSE), P the largest value of the reference", m.psnr));
+    let Report { flip, exposure, tonemap, .. } = report;
+    row(
+        "FLIP",
+        format!("{flip:.6}  mean LDR-FLIP of the pictures, {tonemap} at {exposure:+} EV, 67 pixels a degree"),
+    );
     row("mean test", format!("{:.6e}", m.mean_test));
     row("mean reference", format!("{:.6e}", m.mean_reference));
     row("difference", format!("{:+.4} %  of the means, relative", 100.0 * m.mean_difference));

@@ -1,10 +1,11 @@
 //! The arguments of `gdpt render` as they are typed, and how they become a [`Job`].
 
 use super::progress;
+use crate::denoise;
 use crate::error::{Error, Result};
 use crate::integrate::{Filter, Kind, Settings};
-use crate::reconstruct::Method;
-use crate::render::{Backend, CameraChoice, EnvironmentOptions, Format, Job, Lens, Output, Source};
+use crate::reconstruct::{Alpha, Method};
+use crate::render::{Backend, CameraChoice, EnvironmentOptions, Format, Job, Lens, Output, Source, Stop};
 use crate::scene::{LightUnit, LoadOptions};
 use crate::store::layers::Layer;
 use crate::store::png::ToneMap;
@@ -43,6 +44,12 @@ pub enum MethodFlag {
     L1,
     /// Least squares: unbiased
     L2,
+    /// Least squares, each measurement weighed by its noise
+    Weighted,
+    /// The weighted image, single bad pixels mended by what the first hits tell: the least error
+    Guided,
+    /// The one with the least estimated error
+    Auto,
     /// The sampled image, gradients unused
     None,
 }
@@ -53,6 +60,9 @@ impl MethodFlag {
         match self {
             Self::L1 => Method::L1,
             Self::L2 => Method::L2,
+            Self::Weighted => Method::Weighted,
+            Self::Guided => Method::Guided,
+            Self::Auto => Method::Auto,
             Self::None => Method::None,
         }
     }
@@ -91,6 +101,17 @@ pub enum ToneMapFlag {
     None,
 }
 
+impl ToneMapFlag {
+    /// The typed curve.
+    pub fn curve(self) -> ToneMap {
+        match self {
+            Self::Agx => ToneMap::Agx,
+            Self::Aces => ToneMap::Aces,
+            Self::None => ToneMap::None,
+        }
+    }
+}
+
 /// Arguments of everything that writes PNG.
 #[derive(Args)]
 pub struct DisplayFlags {
@@ -105,12 +126,7 @@ pub struct DisplayFlags {
 impl DisplayFlags {
     /// Exposure and curve.
     pub fn typed(&self) -> (f32, ToneMap) {
-        let curve = match self.tonemap {
-            ToneMapFlag::Agx => ToneMap::Agx,
-            ToneMapFlag::Aces => ToneMap::Aces,
-            ToneMapFlag::None => ToneMap::None,
-        };
-        (self.exposure, curve)
+        (self.exposure, self.tonemap.curve())
     }
 }
 
@@ -123,12 +139,25 @@ pub struct RenderFlags {
     /// File to write, .exr or .png; may be given several times
     #[arg(short, long, value_name = "OUT", required = true)]
     output: Vec<PathBuf>,
+    /// Writes the path-traced image, denoised by Open Image Denoise, to this .exr or .png; needs a build with
+    /// --features denoise
+    #[arg(long, value_name = "OUT")]
+    denoise: Option<PathBuf>,
     /// How light is transported
     #[arg(long, value_name = "METHOD", default_value = "gpt")]
     integrator: IntegratorFlag,
-    /// Samples a pixel
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
-    spp: u32,
+    /// Samples a pixel [default: 64; as many as it takes with --target-error or --time-limit]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    spp: Option<u32>,
+    /// Ends when the estimated relative error of the image is below X: 0.02 is 2 %
+    #[arg(long, value_name = "X", value_parser = positive)]
+    target_error: Option<f32>,
+    /// Ends in time for everything to be written after so long: 90s, 5m, 1h
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    time_limit: Option<f64>,
+    /// With --integrator pt: half the samples use the same random numbers in all pixels, and give the gradients
+    #[arg(long)]
+    common_random_numbers: bool,
     /// Columns and rows [default: 1280x720; 512x512 for built-in scenes]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[u32; 2]>,
@@ -150,12 +179,12 @@ pub struct RenderFlags {
     /// Pixel filter
     #[arg(long, value_name = "FILTER", default_value = "box")]
     filter: FilterFlag,
-    /// How the image is found from samples and gradients [default: l1; none with --integrator pt]
+    /// How the image is found from samples and gradients [default: guided; none with --integrator pt]
     #[arg(long, value_name = "NORM")]
     reconstruct: Option<MethodFlag>,
-    /// Weight of the samples against the gradients in the reconstruction
-    #[arg(long, value_name = "X", default_value_t = 0.2, value_parser = positive)]
-    alpha: f32,
+    /// Weight of the samples against the gradients, for l1 and l2: a number, or auto for that of the measured noise
+    #[arg(long, value_name = "X|auto", default_value = "0.2", value_parser = alpha)]
+    alpha: Alpha,
     /// Roughness (GGX alpha) up to which a bounce is shifted as a mirror's
     #[arg(long, value_name = "ROUGHNESS", default_value_t = 0.001, value_parser = fraction)]
     shift_threshold: f32,
@@ -226,6 +255,9 @@ pub struct RenderFlags {
     pub verbose: bool,
 }
 
+/// Where nothing but an error or a time ends a render.
+const MOST_SAMPLES: u32 = 1 << 20;
+
 /// A list of layers.
 type Layers = Vec<Layer>;
 
@@ -234,13 +266,29 @@ fn number(text: &str, ok: impl Fn(f32) -> bool, what: &str) -> std::result::Resu
     value.ok_or_else(|| format!("is not {what}"))
 }
 
-fn finite(text: &str) -> std::result::Result<f32, String> {
+/// A number.
+pub fn finite(text: &str) -> std::result::Result<f32, String> {
     number(text, |_| true, "a finite number")
 }
 
 /// A number above zero.
 pub fn positive(text: &str) -> std::result::Result<f32, String> {
     number(text, |v| v > 0.0, "a number above 0")
+}
+
+/// `auto` or a number above zero.
+pub fn alpha(text: &str) -> std::result::Result<Alpha, String> {
+    if text == "auto" {
+        return Ok(Alpha::Auto);
+    }
+    number(text, |v| v > 0.0, "auto or a number above 0").map(Alpha::Fixed)
+}
+
+fn duration(text: &str) -> std::result::Result<f64, String> {
+    let units = [('s', 1.0), ('m', 60.0), ('h', 3600.0)];
+    let parse = |(unit, seconds)| Some(text.strip_suffix(unit)?.parse::<f64>().ok()? * seconds);
+    let value = units.into_iter().find_map(parse).filter(|v| v.is_finite() && *v > 0.0);
+    value.ok_or_else(|| "is not a time like 90s, 5m or 1h".into())
 }
 
 fn non_negative(text: &str) -> std::result::Result<f32, String> {
@@ -251,7 +299,7 @@ fn fraction(text: &str) -> std::result::Result<f32, String> {
     number(text, |v| (0.0..=1.0).contains(&v), "a number from 0 to 1")
 }
 
-fn size(text: &str) -> std::result::Result<[u32; 2], String> {
+pub fn size(text: &str) -> std::result::Result<[u32; 2], String> {
     let parsed = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     let size: [u32; 2] = parsed.ok_or("is not of the form 1280x720")?;
     if size.iter().any(|&v| v == 0 || v > 1 << 16) || u64::from(size[0]) * u64::from(size[1]) > 1 << 28 {
@@ -316,6 +364,7 @@ impl RenderFlags {
     /// The job, after the checks that need several arguments.
     pub fn job(&self) -> Result<Job> {
         let outputs = outputs(&self.output)?;
+        let denoised = self.denoised(&outputs)?;
         let has_exr = outputs.iter().any(|o| o.format == Format::Exr);
         if self.buffers && !has_exr {
             return Err(usage("--buffers needs an .exr among the outputs".into()));
@@ -339,7 +388,8 @@ impl RenderFlags {
             height,
             crop: self.crop,
             first_sample: 0,
-            spp: self.spp,
+            spp: self.samples(),
+            common_random_numbers: self.common_random_numbers,
             max_depth: self.max_depth,
             rr_depth: self.rr_depth,
             seed: self.seed,
@@ -350,7 +400,11 @@ impl RenderFlags {
             },
             shift_threshold: self.shift_threshold,
             pair_mis: self.pair_mis == Switch::On,
-            features: layers.iter().any(|l| l.needs_features()) || self.background == Switch::Off,
+            features: layers.iter().any(|l| l.needs_features())
+                || self.buffers
+                || denoised.is_some()
+                || self.background == Switch::Off
+                || matches!(method, Method::Guided | Method::Auto),
         };
         let cpus = || std::thread::available_parallelism().map_or(1, |n| n.get());
         Ok(Job {
@@ -372,26 +426,52 @@ impl RenderFlags {
             robust: self.robust,
             threads: self.threads.map_or_else(cpus, |n| n as usize),
             max_memory: self.max_memory,
+            stop: Stop { seconds: self.time_limit, error: self.target_error.map(f64::from) },
             method,
             alpha: self.alpha,
             layers,
             buffers: self.buffers,
             outputs,
+            denoised,
             exposure,
             tone_map,
             strict: self.strict,
         })
     }
 
+    /// Where the denoised image goes.
+    fn denoised(&self, others: &[Output]) -> Result<Option<Output>> {
+        let Some(path) = &self.denoise else { return Ok(None) };
+        if !denoise::AVAILABLE {
+            return Err(denoise::unavailable());
+        }
+        if others.iter().any(|o| o.path == *path) {
+            return Err(usage(format!("{}: given twice as output", path.display())));
+        }
+        Ok(outputs(std::slice::from_ref(path))?.pop())
+    }
+
     fn method(&self) -> Result<(Kind, Method)> {
         let method = self.reconstruct.map(MethodFlag::method);
+        let common = self.common_random_numbers;
         match (self.integrator, method) {
-            (IntegratorFlag::Gpt, method) => Ok((Kind::GradientPath, method.unwrap_or(Method::L1))),
+            (IntegratorFlag::Gpt, _) if common => Err(usage(
+                "--common-random-numbers needs --integrator pt: gpt has gradients of its own".into(),
+            )),
+            (IntegratorFlag::Gpt, method) => Ok((Kind::GradientPath, method.unwrap_or_default())),
+            (IntegratorFlag::Pt, method) if common => Ok((Kind::Path, method.unwrap_or_default())),
             (IntegratorFlag::Pt, None | Some(Method::None)) => Ok((Kind::Path, Method::None)),
-            (IntegratorFlag::Pt, Some(_)) => {
-                Err(usage("--reconstruct needs gradients: use --integrator gpt".into()))
-            }
+            (IntegratorFlag::Pt, Some(_)) => Err(usage(
+                "--reconstruct needs gradients: use --integrator gpt, or --common-random-numbers".into(),
+            )),
         }
+    }
+
+    /// Samples a pixel; with common random numbers as many again are taken for the gradients.
+    fn samples(&self) -> u32 {
+        let stops = self.time_limit.is_some() || self.target_error.is_some();
+        let spp = self.spp.unwrap_or(if stops { MOST_SAMPLES } else { 64 });
+        if self.common_random_numbers { spp.div_ceil(2) } else { spp }
     }
 
     fn load_options(&self) -> LoadOptions {

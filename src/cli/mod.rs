@@ -3,6 +3,7 @@
 //! Every error is one line on stderr, `gdpt: error: what, where, what to do`; a panic is a bug of ours and says so
 //! the same way.
 
+mod analyze;
 mod compare;
 mod flags;
 mod info;
@@ -11,6 +12,7 @@ mod reconstruct;
 mod render;
 mod signals;
 mod statistics;
+mod study;
 mod terminal;
 
 use crate::error::Error;
@@ -50,6 +52,10 @@ enum Command {
     Reconstruct(reconstruct::Flags),
     /// Measure the error of an image against a reference
     Compare(compare::Flags),
+    /// Say how noisy stored buffers are, what the theory expects, and where gradients pay
+    Analyze(analyze::Flags),
+    /// Measure path tracing against gradient-domain path tracing: one page with tables, curves and pictures
+    Study(study::Flags),
     /// Say what is in a scene and what of it is honoured
     Info(info::Flags),
 }
@@ -84,6 +90,8 @@ fn run(arguments: impl Iterator<Item = OsString>) -> u8 {
         Command::Render(flags) => render::run(*flags),
         Command::Reconstruct(flags) => reconstruct::run(&flags),
         Command::Compare(flags) => compare::run(&flags),
+        Command::Analyze(flags) => analyze::run(&flags),
+        Command::Study(flags) => study::run(&flags),
         Command::Info(flags) => info::run(&flags),
     };
     match result {

@@ -1,10 +1,12 @@
 //! `gdpt reconstruct`: solves again from stored buffers.
 
-use super::flags::{DisplayFlags, MethodFlag, outputs, positive};
+use super::flags::{DisplayFlags, MethodFlag, alpha, outputs};
+use super::render::solve_row;
 use super::signals::Signals;
 use super::terminal;
 use crate::error::Result;
-use crate::render::{metadata, resolve};
+use crate::reconstruct::{Alpha, Method};
+use crate::render::resolve;
 use clap::Args;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -25,11 +27,11 @@ pub struct Flags {
     #[arg(short, long, value_name = "OUT", required = true)]
     output: Vec<PathBuf>,
     /// How the image is found from samples and gradients
-    #[arg(long, value_name = "NORM", default_value = "l1")]
+    #[arg(long, value_name = "NORM", default_value = "guided")]
     reconstruct: MethodFlag,
-    /// Weight of the samples against the gradients
-    #[arg(long, value_name = "X", default_value_t = 0.2, value_parser = positive)]
-    alpha: f32,
+    /// Weight of the samples against the gradients, for l1 and l2: a number, or auto for that of the measured noise
+    #[arg(long, value_name = "X|auto", default_value = "0.2", value_parser = alpha)]
+    alpha: Alpha,
     #[command(flatten)]
     display: DisplayFlags,
     /// Says nothing but errors
@@ -46,10 +48,8 @@ pub fn run(flags: &Flags) -> Result<()> {
             .map_err(|e| signals.name(e))?;
     if !flags.quiet {
         let mut text = String::new();
-        if let Some(residual) = solved {
-            let norm = metadata::method_name(method);
-            writeln!(text, "reconstruct  {norm}, alpha {}, relative residual {residual:.1e}", flags.alpha)
-                .expect("a string grows");
+        if solved.method != Method::None {
+            writeln!(text, "reconstruct  {}", solve_row(&solved)).expect("a string grows");
         }
         for output in &outputs {
             writeln!(text, "wrote        {}", output.path.display()).expect("a string grows");

@@ -6,14 +6,15 @@ use super::signals::Signals;
 use super::{statistics, terminal};
 use crate::error::Result;
 use crate::integrate::ShiftOutcome;
-use crate::render::{self, Job, Report, metadata};
+use crate::reconstruct::Method;
+use crate::render::{self, Job, Report, Solve, metadata};
 use crate::store::atomic;
 use std::fmt::Write;
 
 pub fn run(flags: RenderFlags) -> Result<()> {
     let job = flags.job()?;
     if let Some(path) = &flags.stats_json {
-        let outputs = job.outputs.iter().map(|o| o.path.as_path());
+        let outputs = job.outputs.iter().chain(&job.denoised).map(|o| o.path.as_path());
         atomic::probe(path, &job.inputs().into_iter().chain(outputs).collect::<Vec<_>>())?;
     }
     let signals = Signals::install()?;
@@ -21,6 +22,7 @@ pub fn run(flags: RenderFlags) -> Result<()> {
     let result = render::run(&job, &progress, &signals.cancel);
     progress.finish();
     let report = result.map_err(|e| signals.name(e))?;
+    let job = job.with_samples(report.spp);
     if let Some(path) = &flags.stats_json {
         atomic::write(path, statistics::json(&job, &report).as_bytes())?;
     }
@@ -28,6 +30,16 @@ pub fn run(flags: RenderFlags) -> Result<()> {
         terminal::print(&summary(&job, &report, flags.verbose));
     }
     render::check_strict(&job, &report)
+}
+
+/// How an image was found, in words.
+pub fn solve_row(solve: &Solve) -> String {
+    let Solve { method, alpha, residual, iterations, .. } = solve;
+    let alpha = alpha.map(|alpha| format!(", alpha {alpha}")).unwrap_or_default();
+    format!(
+        "{}{alpha}, {iterations} iterations, relative residual {residual:.1e}",
+        metadata::method_name(*method)
+    )
 }
 
 /// What a person wants to know at the end.
@@ -40,10 +52,9 @@ fn summary(job: &Job, report: &Report, verbose: bool) -> String {
     let s = &job.settings;
     let integrator = metadata::integrator_name(s.kind);
     row("scene", format!("{}, {} triangles", job.source.name(), report.triangles));
-    row("image", format!("{width}x{height}, {} spp, {integrator}, seed {}", s.spp, s.seed));
-    if let Some(residual) = report.residual {
-        let norm = metadata::method_name(job.method);
-        row("reconstruct", format!("{norm}, alpha {}, relative residual {residual:.1e}", job.alpha));
+    row("image", format!("{width}x{height}, {} spp, {integrator}, seed {}", s.samples_taken(), s.seed));
+    if report.solve.method != Method::None {
+        row("reconstruct", solve_row(&report.solve));
     }
     let seconds = &report.seconds;
     row(
@@ -58,14 +69,15 @@ fn summary(job: &Job, report: &Report, verbose: bool) -> String {
     let rays = &report.statistics.rays;
     let lanes = rays.active_lanes_mean();
     row("rays", format!("{}, {:.2} M/s, {lanes:.1} of 16 lanes active", rays.total, per_second(rays.total)));
-    if let Some(error) = report.error_estimate {
-        row("error", format!("{error:.2e} (root mean variance of the samples' mean, before reconstruction)"));
+    if let Some(rel_mse) = report.solve.rel_mse {
+        let percent = 100.0 * rel_mse.sqrt();
+        row("error", format!("{percent:.2} % of the image's values (estimated; relMSE {rel_mse:.2e})"));
     }
     let dropped = [
         (report.load.dropped_triangles, "triangles"),
         (report.load.missing_textures, "textures, missing"),
         (report.dropped_samples, "samples, not finite"),
-        (report.missing as u64, "measurements, not finite"),
+        (report.solve.missing as u64, "measurements, not finite"),
     ];
     for (count, what) in dropped.iter().filter(|d| d.0 > 0) {
         row("dropped", format!("{count} {what}"));
@@ -75,7 +87,7 @@ fn summary(job: &Job, report: &Report, verbose: bool) -> String {
             row("shifts", format!("{count:>14} {outcome}"));
         }
     }
-    for output in &job.outputs {
+    for output in job.outputs.iter().chain(&job.denoised) {
         row("wrote", output.path.display().to_string());
     }
     text

@@ -5,7 +5,7 @@
 //! | `version` | of this format: 1. New fields may come without a new version |
 //! | `gdpt` | version of the program |
 //! | `scene` | what was rendered, `triangles`, `extensions_honoured`, `extensions_ignored` |
-//! | `settings` | what decided the image, as in the EXR's `gdpt/` attributes; `norm`, `alpha`, `threads` |
+//! | `settings` | what decided the image, as in the EXR's `gdpt/` attributes; `norm` (`auto` resolved), `alpha` (null where the norm has none), `threads` |
 //! | `samples` | over all pixels |
 //! | `seconds` | wall time: `load`, `build`, `render`, `reconstruct`, `write` |
 //! | `cpu_seconds` | of the whole process, all threads |
@@ -13,20 +13,15 @@
 //! | `shifts` | counts by outcome |
 //! | `dropped` | `triangles`, `textures` (missing), `samples` (not finite), `measurements` (missing in the solve) |
 //! | `peak_memory_bytes` | of the process; null where the system does not say |
-//! | `error_estimate` | root mean variance of the mean primal, W·m⁻²·sr⁻¹; null below two samples |
-//! | `residual` | of the solve, relative; null without one |
+//! | `error_estimate` | relative error of the image: the root of its estimated relMSE (bias is not seen); null below two samples |
+//! | `solve` | `iterations`, `residual` (relative) |
 //! | `warnings` | of the loader |
 //! | `outputs` | files written |
 
 use crate::integrate::ShiftOutcome;
 use crate::render::{Job, Report, metadata};
+use crate::study::clock::cpu_seconds;
 use serde_json::{Map, Value, json};
-
-/// CPU time of this process, s.
-fn cpu_seconds() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
 
 /// Most memory this process ever held, bytes.
 fn peak_memory() -> Option<u64> {
@@ -45,8 +40,8 @@ fn decimal(value: f32) -> Value {
 pub fn json(job: &Job, report: &Report) -> String {
     let mut settings: Map<String, Value> =
         metadata::settings(job).into_iter().map(|(name, value)| (name.to_owned(), value.into())).collect();
-    settings.insert("norm".into(), metadata::method_name(job.method).into());
-    settings.insert("alpha".into(), decimal(job.alpha));
+    settings.insert("norm".into(), metadata::method_name(report.solve.method).into());
+    settings.insert("alpha".into(), report.solve.alpha.map_or(Value::Null, decimal));
     settings.insert("threads".into(), json!(report.threads));
     let shifts: Map<String, Value> = ShiftOutcome::NAMES
         .into_iter()
@@ -55,7 +50,8 @@ pub fn json(job: &Job, report: &Report) -> String {
         .collect();
     let seconds = &report.seconds;
     let rays = &report.statistics.rays;
-    let outputs: Vec<_> = job.outputs.iter().map(|o| o.path.display().to_string()).collect();
+    let outputs: Vec<_> =
+        job.outputs.iter().chain(&job.denoised).map(|o| o.path.display().to_string()).collect();
     let object = json!({
         "version": 1,
         "gdpt": env!("CARGO_PKG_VERSION"),
@@ -86,11 +82,11 @@ pub fn json(job: &Job, report: &Report) -> String {
             "triangles": report.load.dropped_triangles,
             "textures": report.load.missing_textures,
             "samples": report.dropped_samples,
-            "measurements": report.missing,
+            "measurements": report.solve.missing,
         },
         "peak_memory_bytes": peak_memory(),
-        "error_estimate": report.error_estimate,
-        "residual": report.residual,
+        "error_estimate": report.solve.rel_mse.map(f64::sqrt),
+        "solve": {"iterations": report.solve.iterations, "residual": report.solve.residual},
         "warnings": report.load.warnings,
         "outputs": outputs,
     });

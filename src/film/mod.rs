@@ -6,9 +6,12 @@
 //!
 //! All radiance is W·m⁻²·sr⁻¹, linear Rec.709. 160 bytes a pixel without the feature layers.
 
+pub mod buffers;
+mod passes;
 pub mod plane;
 pub mod tile;
 
+pub use buffers::{Buffers, Measured};
 pub use plane::Plane;
 pub use tile::{Direction, FilmTile, PixelSample};
 

@@ -5,7 +5,7 @@
 //! its neighbour j is the primary hit of lane j: all 64 offset paths start for the price of one more coherent packet.
 
 use super::wave::Region;
-use super::{Filter, View};
+use super::{Filter, Settings, View};
 use crate::accel::{Accel, Coherence, Hits, Rays};
 use crate::film::Direction;
 use crate::math::sampler::{Stream, sample_4d};
@@ -73,7 +73,8 @@ pub struct Primary {
 
 impl Block {
     /// The blocks of a tile.
-    pub fn of_region(region: &Region, seed: u64) -> Vec<Self> {
+    pub fn of_region(region: &Region, settings: &Settings) -> Vec<Self> {
+        let common = |s: Stream| if settings.common_random_numbers { s.common() } else { s };
         let start = |from: u32| from / SIDE * SIDE;
         let mut blocks = Vec::new();
         for y in (start(region.y0)..region.y1).step_by(SIDE as usize) {
@@ -88,9 +89,9 @@ impl Block {
                     }),
                     seeds: std::array::from_fn(|i| {
                         let (x, y) = pixel(i);
-                        Stream::Pixel(x, y).seed(seed)
+                        common(Stream::Pixel(x, y)).seed(settings.seed)
                     }),
-                    seed: Stream::Block(x / SIDE, y / SIDE).seed(seed),
+                    seed: common(Stream::Block(x / SIDE, y / SIDE)).seed(settings.seed),
                 });
             }
         }

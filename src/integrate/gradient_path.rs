@@ -72,7 +72,7 @@ impl Integrator for GradientPath {
         statistics: &mut Statistics,
     ) {
         let Scratch { slots, samples, factors, queues } = scratch.reset(region, &wave);
-        for block in Block::of_region(region, view.settings.seed) {
+        for block in Block::of_region(region, view.settings) {
             let ring_inside = block.ring_inside(region);
             for index in wave.clone() {
                 let primary = block.primary(view, tracer, index);

@@ -64,6 +64,8 @@ pub struct Settings {
     pub rr_depth: u32,
     /// Seed of all random numbers.
     pub seed: u64,
+    /// Whether all pixels draw the same random numbers; a render takes its differences from such a film.
+    pub common_random_numbers: bool,
     /// Pixel filter.
     pub filter: Filter,
     /// GGX alpha at or below which a smooth lobe is glossy for the shift (section 3).
@@ -72,6 +74,13 @@ pub struct Settings {
     pub pair_mis: bool,
     /// Whether to measure feature layers.
     pub features: bool,
+}
+
+impl Settings {
+    /// Samples a pixel: with common random numbers there are as many again, for the differences.
+    pub fn samples_taken(&self) -> u32 {
+        if self.common_random_numbers { 2 * self.spp } else { self.spp }
+    }
 }
 
 impl Default for Settings {
@@ -86,6 +95,7 @@ impl Default for Settings {
             max_depth: 12,
             rr_depth: 5,
             seed: 0,
+            common_random_numbers: false,
             filter: Filter::Box,
             shift_threshold: 0.001,
             pair_mis: true,

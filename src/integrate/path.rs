@@ -66,7 +66,7 @@ impl Integrator for Path {
         _statistics: &mut Statistics,
     ) {
         let Scratch { slots, samples, queues, .. } = scratch.reset(region, &wave);
-        for block in Block::of_region(region, view.settings.seed) {
+        for block in Block::of_region(region, view.settings) {
             for index in wave.clone() {
                 let primary = block.primary(view, tracer, index);
                 let lanes = block.slots(region, index - wave.start);

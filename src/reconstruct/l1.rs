@@ -14,7 +14,7 @@
 
 use super::multigrid::{Multigrid, Weights};
 use super::rows::{BAND, NO_DX, NO_DY, NO_PRIMAL, Problem};
-use super::{Solution, l2};
+use super::{Found, l2};
 use rayon::prelude::*;
 
 /// How a solve is run.
@@ -221,19 +221,14 @@ pub(super) fn objective(problem: &Problem, alpha: f32, v: &[f32]) -> f64 {
 }
 
 /// The L1 image.
-pub(super) fn solve(problem: &Problem, alpha: f32) -> Solution {
+pub(super) fn solve(problem: &Problem, alpha: f32) -> Found {
     solve_with(problem, alpha, DEFAULT)
 }
 
 /// The L1 image by a schedule of one's own.
-pub(super) fn solve_with(problem: &Problem, alpha: f32, schedule: Schedule) -> Solution {
+pub(super) fn solve_with(problem: &Problem, alpha: f32, schedule: Schedule) -> Found {
     let mut v = l2::correction::<f32>(problem, alpha);
-    let done = |v: &[f32], residual, iterations| Solution {
-        image: problem.image(v),
-        residual,
-        iterations,
-        missing: problem.missing,
-    };
+    let done = |v: &[f32], residual, iterations| Found { image: problem.image(v), residual, iterations };
     if v.is_empty() {
         return done(&v, 0.0, 0);
     }

@@ -7,7 +7,7 @@
 //! With missing rows the operator is no longer diagonal. The same problem with the weight zero for those rows is
 //! then solved by conjugate gradients to [`TOLERANCE`], started from the transform.
 
-use super::Solution;
+use super::Found;
 use super::dct::{DctSolver, Real};
 use super::multigrid::{Multigrid, Weights};
 use super::rows::{BAND, NO_DX, NO_DY, NO_PRIMAL, Problem};
@@ -33,12 +33,12 @@ pub(super) fn correction<T: Real>(problem: &Problem, alpha: f32) -> Vec<T> {
 }
 
 /// The least-squares image.
-pub(super) fn solve(problem: &Problem, alpha: f32) -> Solution {
+pub(super) fn solve(problem: &Problem, alpha: f32) -> Found {
     let mut y = correction::<f32>(problem, alpha);
     let (primal, gradient) = row_weights(alpha);
     if problem.missing == 0 {
         let residual = uniform_residual(problem, primal as f32, gradient as f32, &y);
-        return Solution { image: problem.image(&y), residual, iterations: 0, missing: 0 };
+        return Found { image: problem.image(&y), residual, iterations: 0 };
     }
     let mut r = problem.divergence::<f32>(gradient);
     let scale = norm_square(&r);
@@ -48,7 +48,7 @@ pub(super) fn solve(problem: &Problem, alpha: f32) -> Solution {
     let (iterations, left) =
         multigrid.conjugate_gradients(&mut y, &mut r, MAX_STEPS, scale * TOLERANCE.powi(2));
     let residual = if scale > 0.0 { (left / scale).sqrt() } else { 0.0 };
-    Solution { image: problem.image(&y), residual, iterations, missing: problem.missing }
+    Found { image: problem.image(&y), residual, iterations }
 }
 
 /// Sum of squares, in an order that does not depend on the threads.
@@ -66,7 +66,7 @@ fn uniform_residual(problem: &Problem, primal: f32, gradient: f32, y: &[f32]) ->
     let row = |i: usize| &y[i * stride..(i + 1) * stride];
     let sums = (0..h.div_ceil(BAND)).into_par_iter().map(|band| {
         let mut sums = (0.0, 0.0);
-        problem.divergence_band(gradient, band, &mut vec![0.0; stride], |i, b| {
+        problem.divergence_band(gradient, band, &mut vec![0.0; stride], &|_, _, _| (), |i, b| {
             let (above, here, below) = (row(i.saturating_sub(1)), row(i), row((i + 1).min(h - 1)));
             for c in 0..3 {
                 let part = c * w..(c + 1) * w;

@@ -4,9 +4,9 @@
 //! ex = dx − Dx g and ey = dy − Dy g, so consistent data give y = 0 exactly and rounding scales with the noise, not
 //! with the image. A field is one value a channel and pixel, row y being R, G, B one after the other (3 W values).
 
+use super::LIMIT;
 use super::dct::{Real, real};
-use super::{Input, LIMIT};
-use crate::film::Plane;
+use crate::film::{Measured, Plane};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -33,12 +33,13 @@ pub(crate) struct Problem<'a> {
     pub missing: usize,
 }
 
-fn measured(v: &[f32; 3]) -> bool {
+/// Whether a value is a measurement.
+pub(crate) fn measured(v: &[f32; 3]) -> bool {
     v.iter().all(|v| v.abs() <= LIMIT)
 }
 
 impl<'a> Problem<'a> {
-    pub fn new(input: &Input<'a>) -> Self {
+    pub fn new(input: &'a Measured) -> Self {
         let (width, height) = (input.primal.width, input.primal.height);
         let bits = |i: usize| {
             let (inside_x, inside_y) = (i % width + 1 < width, i / width + 1 < height);
@@ -50,9 +51,9 @@ impl<'a> Problem<'a> {
         let mut problem = Self {
             width,
             height,
-            primal: Cow::Borrowed(input.primal),
-            dx: input.dx,
-            dy: input.dy,
+            primal: Cow::Borrowed(&input.primal),
+            dx: &input.dx,
+            dy: &input.dy,
             mask: Vec::new(),
             missing,
         };
@@ -131,12 +132,13 @@ impl<'a> Problem<'a> {
     }
 
     /// Walks down the pixel rows of band `band`, giving `visit` the number of each and `weight` · Dᵀ e in it; `row` is
-    /// where it is formed.
+    /// where it is formed. `weigh` may change the residuals ex and ey of a pixel row before.
     pub fn divergence_band<T: Real>(
         &self,
         weight: T,
         band: usize,
         row: &mut [T],
+        weigh: &impl Fn(usize, &mut [T], &mut [T]),
         mut visit: impl FnMut(usize, &[T]),
     ) {
         let (w, stride) = (self.width, self.stride());
@@ -144,9 +146,11 @@ impl<'a> Problem<'a> {
         let (mut ex, mut ey, mut above) = (zero(), zero(), zero());
         if band > 0 {
             self.residuals(band * BAND - 1, &mut ex, &mut above);
+            weigh(band * BAND - 1, &mut ex, &mut above);
         }
         for y in band * BAND..((band + 1) * BAND).min(self.height) {
             self.residuals(y, &mut ex, &mut ey);
+            weigh(y, &mut ex, &mut ey);
             for c in 0..3 {
                 let part = c * w..(c + 1) * w;
                 let [ex, ey, above] = [&ex, &ey, &above].map(|e| &e[part.clone()]);
@@ -163,6 +167,15 @@ impl<'a> Problem<'a> {
 
     /// `weight` · Dᵀ e: the right-hand side of the unweighted problem.
     pub fn divergence<T: Real>(&self, weight: f64) -> Vec<T> {
+        self.weighted_divergence(weight, &|_, _, _| ())
+    }
+
+    /// `weight` · Dᵀ e, `weigh` having changed the residuals of each pixel row.
+    pub fn weighted_divergence<T: Real>(
+        &self,
+        weight: f64,
+        weigh: &(impl Fn(usize, &mut [T], &mut [T]) + Sync),
+    ) -> Vec<T> {
         let stride = self.stride();
         let mut field = vec![T::zero(); stride * self.height];
         if field.is_empty() {
@@ -170,7 +183,7 @@ impl<'a> Problem<'a> {
         }
         field.par_chunks_mut(BAND * stride).enumerate().for_each(|(band, rows)| {
             let mut line = vec![T::zero(); stride];
-            self.divergence_band(real(weight), band, &mut line, |y, row| {
+            self.divergence_band(real(weight), band, &mut line, weigh, |y, row| {
                 rows[(y - band * BAND) * stride..][..stride].copy_from_slice(row);
             });
         });

@@ -5,6 +5,7 @@ mod frequency;
 use super::multigrid::Multigrid;
 use super::rows::Problem;
 use super::*;
+use crate::film::Measured as Planes;
 use faer::prelude::Solve;
 
 const NAN: [f32; 3] = [f32::NAN; 3];
@@ -30,21 +31,9 @@ impl Noise {
     }
 }
 
-/// Planes of one problem.
-#[derive(Clone)]
-struct Planes {
-    primal: Plane,
-    dx: Plane,
-    dy: Plane,
-}
-
 impl Planes {
-    fn input(&self) -> Input<'_> {
-        Input { primal: &self.primal, dx: &self.dx, dy: &self.dy }
-    }
-
     fn solve(&self, method: Method, alpha: f32) -> Plane {
-        reconstruct(&self.input(), method, alpha).image
+        reconstruct(&Input::new(self), method, Alpha::Fixed(alpha)).image
     }
 
     /// The consistent problem of `image`, NaN where nothing may be read.
@@ -155,7 +144,7 @@ fn dense_l2(planes: &Planes, alpha: f64, channel: usize) -> Vec<f64> {
 fn transform_agrees_with_a_dense_solve() {
     let (w, h, alpha) = (12, 12, 0.2f32);
     let planes = Planes::noisy(&picture(w, h), 0.3, 0.1, 1);
-    let problem = Problem::new(&planes.input());
+    let problem = Problem::new(&planes);
     let y64: Vec<f64> = l2::correction(&problem, alpha);
     let image = planes.solve(Method::L2, alpha);
     for c in 0..3 {
@@ -197,7 +186,7 @@ fn missing_rows_are_left_out() {
         planes.dx.data[i] = NAN;
         planes.dy.data[i + 2] = NAN;
     }
-    let solution = reconstruct(&planes.input(), Method::L2, 0.2);
+    let solution = reconstruct(&Input::new(&planes), Method::L2, Alpha::Fixed(0.2));
     assert_eq!(solution.missing, 11);
     assert!(solution.residual <= 1e-6, "{}", solution.residual);
     for c in 0..3 {
@@ -216,7 +205,7 @@ fn one_bad_pixel_stays_local() {
         planes.dx.data[10 * 64 + 50] = [bad; 3];
         planes.dy.data[40 * 64 + 5][2] = bad;
         for method in [Method::L1, Method::L2, Method::None] {
-            let solution = reconstruct(&planes.input(), method, 0.2);
+            let solution = reconstruct(&Input::new(&planes), method, Alpha::Fixed(0.2));
             assert_eq!(solution.missing, 3);
             let difference = zip(&solution.image, &clean.solve(method, 0.2), |a, b| a - b);
             assert!(difference.data.iter().flatten().all(|v| v.is_finite()));
@@ -248,7 +237,7 @@ fn operator_is_adjoint_symmetric_and_positive() {
         let plane = if row[0].0 == row[1].0 + 1 { &mut planes.dx } else { &mut planes.dy };
         plane.data[row[1].0] = [*y as f32; 3];
     }
-    let divergence: Vec<f64> = Problem::new(&planes.input()).divergence(1.0);
+    let divergence: Vec<f64> = Problem::new(&planes).divergence(1.0);
     let adjoint = |i: usize| alpha * y[i] + divergence[3 * (i / w) * w + i % w];
     let left: f64 = kx.iter().zip(&y).map(|(a, b)| a * b).sum();
     let right: f64 = (0..w * h).map(|i| x[i] * adjoint(i)).sum();
@@ -280,7 +269,7 @@ fn operator_is_adjoint_symmetric_and_positive() {
 fn conjugate_gradients_agree_with_the_transform() {
     for alpha in [0.02f32, 0.2, 1.0] {
         let planes = Planes::noisy(&picture(61, 40), 0.3, 0.05, 6);
-        let problem = Problem::new(&planes.input());
+        let problem = Problem::new(&planes);
         let (primal, gradient) = l2::row_weights(alpha);
         let mut r = problem.divergence::<f32>(gradient);
         let mut x = vec![0.0; r.len()];
@@ -433,7 +422,7 @@ fn l1_shrugs_off_outliers() {
 fn l1_reaches_the_objective_of_a_long_run() {
     let image = picture(64, 64);
     for planes in [Planes::noisy(&image, 0.3, 0.06, 15), with_outliers(&image, 16)] {
-        let problem = Problem::new(&planes.input());
+        let problem = Problem::new(&planes);
         let objective = |image: &Plane| {
             let w = image.width;
             let correction: Vec<f32> = (0..3 * w * image.height)
@@ -447,7 +436,7 @@ fn l1_reaches_the_objective_of_a_long_run() {
         };
         let long = l1::Schedule { outer: 64, steps: 40, reg: 1.0, decay: 0.7, tolerance: -1.0 };
         let best = objective(&l1::solve_with(&problem, 0.2, long).image);
-        let solution = reconstruct(&planes.input(), Method::L1, 0.2);
+        let solution = reconstruct(&Input::new(&planes), Method::L1, Alpha::Fixed(0.2));
         let ours = objective(&solution.image);
         assert!(ours < 1.005 * best, "{ours} against {best}");
         assert!(solution.residual < 0.005, "{}", solution.residual);

@@ -1,7 +1,7 @@
 //! A render, fully specified: the command line after all defaults and checks.
 
 use crate::integrate::Settings;
-use crate::reconstruct::Method;
+use crate::reconstruct::{Alpha, Method};
 use crate::scene::LoadOptions;
 use crate::store::layers::Layer;
 use crate::store::png::ToneMap;
@@ -96,6 +96,15 @@ pub struct Output {
     pub format: Format,
 }
 
+/// What ends a render before it has taken all samples of its settings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stop {
+    /// Seconds from the start to the last file written.
+    pub seconds: Option<f64>,
+    /// Relative error of the reconstructed image, the root of its estimated relMSE.
+    pub error: Option<f64>,
+}
+
 /// Everything that [`super::run`] needs.
 #[derive(Clone, Debug)]
 pub struct Job {
@@ -121,16 +130,20 @@ pub struct Job {
     pub threads: usize,
     /// Budget, bytes.
     pub max_memory: Option<u64>,
+    /// When rendering ends before all samples are taken.
+    pub stop: Stop,
     /// How the image is solved for.
     pub method: Method,
     /// Weight of the primal against the gradients.
-    pub alpha: f32,
+    pub alpha: Alpha,
     /// Layers of the EXR beside the image.
     pub layers: Vec<Layer>,
     /// Whether the EXR keeps what is needed to solve again.
     pub buffers: bool,
     /// What is written.
     pub outputs: Vec<Output>,
+    /// Where the path-traced image goes, denoised.
+    pub denoised: Option<Output>,
     /// Stops, for PNG.
     pub exposure: f32,
     /// For PNG.
@@ -147,6 +160,11 @@ impl Job {
             Source::Builtin(_) => None,
         };
         scene.into_iter().chain(self.environment.as_ref().map(|e| e.path.as_path())).collect()
+    }
+
+    /// The job that takes `spp` samples a pixel.
+    pub fn with_samples(&self, spp: u32) -> Self {
+        Self { settings: Settings { spp, ..self.settings }, ..self.clone() }
     }
 
     /// Columns and rows that are rendered: the crop's, or all.

@@ -1,6 +1,7 @@
 //! What decided an image, as text attributes of its file: equal attributes mean equal pixels. No host, clock,
 //! timing or thread count.
 
+use super::Solve;
 use super::job::{CameraChoice, Job, Source};
 use crate::error::{Error, Result};
 use crate::integrate::{Filter, Kind};
@@ -32,6 +33,9 @@ pub fn method_name(method: Method) -> &'static str {
     match method {
         Method::L1 => "l1",
         Method::L2 => "l2",
+        Method::Weighted => "weighted",
+        Method::Guided => "guided",
+        Method::Auto => "auto",
         Method::None => "none",
     }
 }
@@ -58,7 +62,7 @@ pub fn settings(job: &Job) -> Vec<(&'static str, String)> {
     let s = &job.settings;
     let mut list = vec![
         ("integrator", integrator_name(s.kind).to_owned()),
-        ("spp", s.spp.to_string()),
+        ("spp", s.samples_taken().to_string()),
         ("samples", format!("{}..{}", s.first_sample, u64::from(s.first_sample) + u64::from(s.spp))),
         ("seed", s.seed.to_string()),
         ("size", format!("{}x{}", s.width, s.height)),
@@ -74,6 +78,9 @@ pub fn settings(job: &Job) -> Vec<(&'static str, String)> {
     if s.kind == Kind::GradientPath {
         list.push(("shift_threshold", s.shift_threshold.to_string()));
         list.push(("pair_mis", on_off(s.pair_mis)));
+    }
+    if s.common_random_numbers {
+        list.push(("common_random_numbers", on_off(true)));
     }
     if let Some([x0, y0, x1, y1]) = s.crop {
         list.push(("crop", format!("{x0},{y0},{x1},{y1}")));
@@ -114,15 +121,23 @@ pub(super) fn set_job(document: &mut Document, job: &Job) -> Result<()> {
 }
 
 /// Adds how the image was solved for.
-pub(super) fn set_solve(document: &mut Document, method: Method, alpha: f32, residual: Option<f64>) {
-    set(document, "norm", method_name(method).into());
+pub(super) fn set_solve(document: &mut Document, solve: &Solve) {
+    set(document, "norm", method_name(solve.method).into());
     for name in ["gdpt/alpha", "gdpt/residual"] {
         document.attributes.remove(name);
     }
-    if let Some(residual) = residual {
+    if let Some(alpha) = solve.alpha {
         set(document, "alpha", alpha.to_string());
-        set(document, "residual", format!("{residual:e}"));
     }
+    if solve.method != Method::None {
+        set(document, "residual", format!("{:e}", solve.residual));
+    }
+}
+
+/// Adds that the image is the sampled one, denoised.
+pub(super) fn set_denoised(document: &mut Document) {
+    set(document, "norm", method_name(Method::None).into());
+    set(document, "denoiser", "oidn".into());
 }
 
 /// Adds the camera's matrices, for a film of `width`×`height` (the whole picture).

@@ -102,8 +102,9 @@ fn choose_camera(scene: &Scene, choice: &CameraChoice, monitor: &dyn Monitor) ->
     })
 }
 
-/// Bytes a pixel of the film and of what is made of it, rounded up: sums, features, planes of the solve, encoding.
-const BYTES_PER_PIXEL: u64 = 600;
+/// Bytes a pixel of the film and of what is made of it, rounded up: sums and features (204, twice where passes are
+/// added up), the planes that are solved for (164), the solver's own (250), encoding.
+const BYTES_PER_PIXEL: u64 = 900;
 
 /// Refuses a film that cannot fit, before it is allocated.
 pub(super) fn check_memory(job: &Job) -> Result<()> {

@@ -1,9 +1,9 @@
 //! Solving again from the buffers of a file: another norm, another alpha, no rendering.
 
 use super::job::{Format, Output};
-use super::metadata;
+use super::{Solve, metadata};
 use crate::error::Result;
-use crate::reconstruct::Method;
+use crate::reconstruct::{Alpha, Method};
 use crate::store::png::{self, ToneMap};
 use crate::store::{atomic, exr, layers};
 use std::num::NonZero;
@@ -11,15 +11,14 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 /// Reads the buffers of `input`, solves, and writes the outputs with the layers and the metadata of the input.
-/// Returns the relative residual of the solve.
 pub fn run(
     input: &Path,
     outputs: &[Output],
     method: Method,
-    alpha: f32,
+    alpha: Alpha,
     (exposure, tone_map): (f32, ToneMap),
     cancel: &AtomicBool,
-) -> Result<Option<f64>> {
+) -> Result<Solve> {
     for output in outputs {
         atomic::probe(&output.path, &[input])?;
     }
@@ -27,17 +26,16 @@ pub fn run(
     let buffers = layers::buffers(&document, input)?;
     // The same kind of workers as a render has: equal buffers give equal bytes.
     let workers = super::pool(std::thread::available_parallelism().map_or(1, NonZero::get))?;
-    let solution = workers.install(|| {
-        super::solve_planes(&buffers.primal, &buffers.dx, &buffers.dy, &buffers.direct, method, alpha)
-    });
+    let solved = workers.install(|| super::solve(&buffers, method, alpha));
+    let solve = Solve::of(&solved.solution);
     super::go_on(cancel)?;
-    layers::set_image(&mut document, &solution.image);
-    metadata::set_solve(&mut document, method, alpha, solution.residual);
+    layers::set_image(&mut document, &solved.image);
+    metadata::set_solve(&mut document, &solve);
     for output in outputs {
         match output.format {
             Format::Exr => exr::write(&output.path, &document)?,
-            Format::Png => png::write(&output.path, &solution.image, exposure, tone_map)?,
+            Format::Png => png::write(&output.path, &solved.image, exposure, tone_map)?,
         }
     }
-    Ok(solution.residual)
+    Ok(solve)
 }

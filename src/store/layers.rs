@@ -3,11 +3,11 @@
 //! Root `R, G, B, A`: the image, A = 1. Optional: `Z` (m), `N.X/Y/Z` (world, shading), `P.X/Y/Z` (m, world),
 //! `albedo`, `emission` (very direct light), `variance` (of the mean primal), `spp.Y`. Buffers, enough to solve
 //! again: `primal`, `dx`, `dy`, their halves `_a` and `_b`, and `moments`, the mean squared luminance of the four
-//! one-sided gradients.
+//! one-sided gradients; with them always `albedo`, `N`, `P` and `Z`.
 
 use super::Document;
 use crate::error::{Error, Result};
-use crate::film::{Direction, Film, Half, Plane};
+use crate::film::{Buffers, Direction, Features, Film, Half, Measured, Plane};
 
 /// `Z` where the camera ray meets nothing, m: finite, and beyond any scene.
 pub const FAR: f32 = 1e10;
@@ -105,12 +105,18 @@ fn set_layer(document: &mut Document, film: &Film, layer: Layer) {
 }
 
 fn set_buffers(document: &mut Document, film: &Film) {
-    set_layer(document, film, Layer::Emission);
+    for layer in [Layer::Emission, Layer::Albedo, Layer::N, Layer::P, Layer::Z] {
+        set_layer(document, film, layer);
+    }
     for (half, suffix) in [(Half::Both, ""), (Half::A, "_a"), (Half::B, "_b")] {
-        document.set_plane(&format!("primal{suffix}"), RGB, &film.primal(half));
+        if film.samples(half) == 0 {
+            continue;
+        }
+        let measured = film.measured(half);
+        document.set_plane(&format!("primal{suffix}"), RGB, &measured.primal);
         if film.has_gradients {
-            document.set_plane(&format!("dx{suffix}"), RGB, &film.dx(half));
-            document.set_plane(&format!("dy{suffix}"), RGB, &film.dy(half));
+            document.set_plane(&format!("dx{suffix}"), RGB, &measured.dx);
+            document.set_plane(&format!("dy{suffix}"), RGB, &measured.dy);
         }
     }
     if film.has_gradients {
@@ -118,19 +124,6 @@ fn set_buffers(document: &mut Document, film: &Film) {
             document.channels.insert(format!("moments.{name}"), film.gradient_square(direction));
         }
     }
-}
-
-/// What a solver needs, read from a file.
-#[derive(Clone, Debug)]
-pub struct Buffers {
-    /// Radiance without very direct light.
-    pub primal: Plane,
-    /// Horizontal differences.
-    pub dx: Plane,
-    /// Vertical differences.
-    pub dy: Plane,
-    /// Very direct light.
-    pub direct: Plane,
 }
 
 /// The buffers in a document; `path` is for the message where they are not there.
@@ -142,7 +135,25 @@ pub fn buffers(document: &Document, path: &std::path::Path) -> Result<Buffers> {
             what: format!("has no layer {layer}; render it with --integrator gpt --buffers"),
         })
     };
-    Ok(Buffers { primal: plane("primal")?, dx: plane("dx")?, dy: plane("dy")?, direct: plane("emission")? })
+    let measured = |suffix: &str| -> Result<Measured> {
+        let [primal, dx, dy] = ["primal", "dx", "dy"].map(|layer| plane(&format!("{layer}{suffix}")));
+        Ok(Measured { primal: primal?, dx: dx?, dy: dy? })
+    };
+    let halves = measured("_a").and_then(|a| Ok([a, measured("_b")?])).ok();
+    Ok(Buffers { all: measured("")?, halves, direct: plane("emission")?, features: features(document) })
+}
+
+/// The features in a document, where all are there. Coverage is not stored: it is 1 where anything was met.
+fn features(document: &Document) -> Option<Features> {
+    let depth = document.channels.get("Z")?;
+    let met = |z: &f32| z.is_finite() && *z < FAR;
+    Some(Features {
+        coverage: depth.iter().map(|z| f32::from(u8::from(met(z)))).collect(),
+        depth: depth.iter().map(|z| if met(z) { *z } else { f32::INFINITY }).collect(),
+        normal: document.layer("N", XYZ)?,
+        position: document.layer("P", XYZ)?,
+        albedo: document.plane("albedo")?,
+    })
 }
 
 #[cfg(test)]
@@ -198,7 +209,8 @@ mod tests {
         let path = std::path::Path::new("a.exr");
         let full = document(&film, &film.primal(Half::Both), &[], true, false);
         let back = buffers(&full, path).expect("they were stored");
-        assert_eq!((back.dx, back.dy), (film.dx(Half::Both), film.dy(Half::Both)));
+        assert_eq!(back.all, film.measured(Half::Both));
+        assert_eq!(back.halves, film.buffers().halves);
         assert_eq!(back.direct, film.direct());
         let plain = document(&film, &film.primal(Half::Both), &[], false, true);
         assert_eq!((full.channels["A"][0], plain.channels["A"][0], plain.channels["A"][1]), (1.0, 0.0, 1.0));

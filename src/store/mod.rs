@@ -56,7 +56,12 @@ impl Document {
 
     /// The colour plane of a layer, or nothing where one of its three channels is missing.
     pub fn plane(&self, layer: &str) -> Option<Plane> {
-        let [r, g, b] = ["R", "G", "B"].map(|suffix| self.channels.get(&channel_name(layer, suffix)));
+        self.layer(layer, ["R", "G", "B"])
+    }
+
+    /// The three channels of a layer by their suffixes, or nothing where one is missing.
+    pub fn layer(&self, layer: &str, suffixes: [&str; 3]) -> Option<Plane> {
+        let [r, g, b] = suffixes.map(|suffix| self.channels.get(&channel_name(layer, suffix)));
         let data = r?.iter().zip(g?).zip(b?).map(|((&r, &g), &b)| [r, g, b]).collect();
         Some(Plane { width: self.width, height: self.height, data })
     }

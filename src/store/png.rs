@@ -24,6 +24,17 @@ pub enum ToneMap {
     None,
 }
 
+impl ToneMap {
+    /// The word on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Agx => "agx",
+            Self::Aces => "aces",
+            Self::None => "none",
+        }
+    }
+}
+
 /// Rows sum to 1: white stays white. Channels mix before the curve, so that none saturates alone.
 const AGX_INSET: Mat3 = Mat3::from_cols_array(&[
     0.842_479_1,
@@ -89,15 +100,19 @@ fn encode_pixel(radiance: [f32; 3], scale: f32, tone_map: ToneMap) -> [u8; 3] {
     display.to_array().map(|v| (srgb(v.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8)
 }
 
+/// The picture of `plane` with `exposure` in stops: 8-bit sRGB, row by row.
+pub fn rgb8(plane: &Plane, exposure: f32, tone_map: ToneMap) -> Vec<u8> {
+    let scale = exposure.exp2();
+    plane.data.iter().flat_map(|&p| encode_pixel(p, scale, tone_map)).collect()
+}
+
 /// The bytes of a PNG of `plane` with `exposure` in stops.
 pub fn encode(plane: &Plane, exposure: f32, tone_map: ToneMap) -> std::io::Result<Vec<u8>> {
-    let scale = exposure.exp2();
-    let pixels: Vec<u8> = plane.data.iter().flat_map(|&p| encode_pixel(p, scale, tone_map)).collect();
-    encode_rgb8(&pixels, plane.width, plane.height)
+    encode_rgb8(&rgb8(plane, exposure, tone_map), plane.width, plane.height)
 }
 
 /// The bytes of a PNG of 8-bit sRGB pixels.
-fn encode_rgb8(pixels: &[u8], width: usize, height: usize) -> std::io::Result<Vec<u8>> {
+pub fn encode_rgb8(pixels: &[u8], width: usize, height: usize) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     image::codecs::png::PngEncoder::new(&mut bytes)
         .write_image(pixels, width as u32, height as u32, image::ExtendedColorType::Rgb8)

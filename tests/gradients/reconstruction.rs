@@ -6,11 +6,10 @@ use super::common::seeds::{Runs, z_score};
 use super::common::{accel, render, settings};
 use gdpt::film::{Film, Half};
 use gdpt::integrate::Kind;
-use gdpt::reconstruct::{Input, Method, reconstruct};
+use gdpt::reconstruct::{Alpha, Input, Method, reconstruct};
 
 fn image(film: &Film, method: Method) -> Vec<[f32; 3]> {
-    let (primal, dx, dy) = (film.primal(Half::Both), film.dx(Half::Both), film.dy(Half::Both));
-    reconstruct(&Input { primal: &primal, dx: &dx, dy: &dy }, method, 0.2).image.data
+    reconstruct(&Input::new(&film.measured(Half::Both)), method, Alpha::Fixed(0.2)).image.data
 }
 
 fn check(scene: TestScene) {

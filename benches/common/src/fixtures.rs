@@ -1,7 +1,7 @@
 //! Inputs of the small benches: surfaces to shade, vertices to shift, noisy planes to solve, samples to merge.
 
 use gdpt::accel::Hits;
-use gdpt::film::{PixelSample, Plane};
+use gdpt::film::{Buffers, Measured, PixelSample, Plane};
 use gdpt::math::{Frame, LANES, Mask, Vec3x, f32x16, lanes, splat};
 use gdpt::scene::{Environment, Instance, Material, Mesh, Scene, Texture, TextureRef, Wrap};
 use gdpt::shade::{Bsdf, Surface};
@@ -118,16 +118,29 @@ fn noise(x: usize, y: usize, salt: u64) -> f32 {
     if bytes[7] < 3 { 20.0 * sum } else { sum }
 }
 
-/// A chequered image and its differences, noisy: primal, dx, dy.
-pub fn noisy_planes(width: usize, height: usize) -> [Plane; 3] {
+/// A chequered image and its differences, noisy, in two halves.
+pub fn noisy_buffers(width: usize, height: usize) -> Buffers {
     let value = |x: usize, y: usize| if (x / 40 + y / 33).is_multiple_of(2) { 0.9 } else { 0.2f32 };
-    let primal = Plane::from_fn(width, height, |x, y| [value(x, y) + 0.3 * noise(x, y, 1); 3]);
-    let difference = |sx: usize, sy: usize, salt: u64| {
-        Plane::from_fn(width, height, |x, y| {
-            [value(x + sx, y + sy) - value(x, y) + 0.05 * noise(x, y, salt); 3]
-        })
+    let half = |first_salt: u64| {
+        let difference = |sx: usize, sy: usize, salt: u64| {
+            Plane::from_fn(width, height, |x, y| {
+                [value(x + sx, y + sy) - value(x, y) + 0.07 * noise(x, y, first_salt + salt); 3]
+            })
+        };
+        Measured {
+            primal: Plane::from_fn(width, height, |x, y| [value(x, y) + 0.42 * noise(x, y, first_salt); 3]),
+            dx: difference(1, 0, 1),
+            dy: difference(0, 1, 2),
+        }
     };
-    [primal, difference(1, 0, 2), difference(0, 1, 3)]
+    let halves = [half(1), half(4)];
+    let mean = |plane: fn(&Measured) -> &Plane| {
+        let [a, b] = halves.each_ref().map(plane);
+        let mean = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
+        Plane { width, height, data: a.data.iter().zip(&b.data).map(mean).collect() }
+    };
+    let all = Measured { primal: mean(|m| &m.primal), dx: mean(|m| &m.dx), dy: mean(|m| &m.dy) };
+    Buffers { all, halves: Some(halves), direct: Plane::new(width, height), features: None }
 }
 
 /// A sample with all its parts.

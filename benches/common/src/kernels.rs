@@ -5,7 +5,7 @@
 //! collect in. Renders trace with obvhs first, which is compiled with the rest and therefore answers the same
 //! everywhere, and are then repeated on the recorded answers.
 
-use crate::fixtures::{fields, hits, materials, noisy_planes, sample, uniform, vertex};
+use crate::fixtures::{fields, hits, materials, noisy_buffers, sample, uniform, vertex};
 use crate::render::{render, settings};
 use crate::replay::Recorder;
 use crate::shapes;
@@ -14,7 +14,7 @@ use gdpt::film::{Film, FilmTile};
 use gdpt::integrate::Kind;
 use gdpt::math::{Mask, Vec3x, lanes};
 use gdpt::path::shift::{PairWeights, half_vector, reconnect};
-use gdpt::reconstruct::{Input, Method, reconstruct};
+use gdpt::reconstruct::{Alpha, Input, Method, reconstruct};
 use gdpt::scene::{Material, Scene, builtin};
 use gdpt::shade::{Receiver, ShadeScene, Surface};
 use glam::Vec3;
@@ -22,7 +22,11 @@ use rayon::ThreadPoolBuilder;
 use std::hint::black_box;
 
 /// Every way to solve for the image.
-pub const SOLVERS: [(&str, Method); 2] = [("L2", Method::L2), ("L1", Method::L1)];
+pub const SOLVERS: [(&str, Method); 3] =
+    [("L2", Method::L2), ("L1", Method::L1), ("weighted", Method::Weighted)];
+
+/// The weight of the primal in every solve.
+pub const ALPHA: Alpha = Alpha::Fixed(0.2);
 
 /// Numbers a kernel knows without callgrind, by name: they are compared like the instructions.
 pub type Facts = Vec<(String, f64)>;
@@ -36,7 +40,7 @@ pub struct Kernel {
 }
 
 /// All kernels.
-pub const KERNELS: [Kernel; 13] = [
+pub const KERNELS: [Kernel; 14] = [
     Kernel { name: "path tracing, diffuse tile", run: || tile(Kind::Path, diffuse_box()) },
     Kernel { name: "path tracing, mixed tile", run: || tile(Kind::Path, mixed_box()) },
     Kernel { name: "gradient-domain, diffuse tile", run: || tile(Kind::GradientPath, diffuse_box()) },
@@ -52,6 +56,7 @@ pub const KERNELS: [Kernel; 13] = [
     Kernel { name: "shift", run: shift },
     Kernel { name: "L2 solve", run: || solve(Method::L2) },
     Kernel { name: "L1 solve", run: || solve(Method::L1) },
+    Kernel { name: "weighted solve", run: || solve(Method::Weighted) },
     Kernel { name: "film", run: film },
 ];
 
@@ -160,12 +165,12 @@ fn shift() -> Facts {
 
 /// A small image: many steps of the solvers, few instructions each.
 fn solve(method: Method) -> Facts {
-    let [primal, dx, dy] = noisy_planes(96, 64);
-    let input = Input { primal: &primal, dx: &dx, dy: &dy };
+    let buffers = noisy_buffers(96, 64);
+    let input = Input::from(&buffers);
     let pool = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
     let solution = pool
         .expect("this thread is there")
-        .install(|| counted_region(|| reconstruct(black_box(&input), method, 0.2)));
+        .install(|| counted_region(|| reconstruct(black_box(&input), method, ALPHA)));
     vec![("iterations".into(), solution.iterations as f64)]
 }
 
