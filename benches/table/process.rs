@@ -2,8 +2,8 @@
 
 use super::Effort;
 use gdpt::film::Film;
-use gdpt::reconstruct::{Input, reconstruct};
-use gdpt_bench::fixtures::noisy_buffers;
+use gdpt::reconstruct::reconstruct;
+use gdpt_bench::fixtures::{noisy_buffers, problem};
 use gdpt_bench::kernels::{ALPHA, SOLVERS};
 use gdpt_bench::measure::{median, peak_memory, resident_memory};
 use gdpt_bench::scenes::{self, BenchScene};
@@ -41,7 +41,7 @@ pub fn child(name: &str) -> io::Result<()> {
     } else {
         let (_, method) = SOLVERS.into_iter().find(|solver| solver.0 == what).ok_or_else(usage)?;
         let buffers = noisy_buffers(width, height);
-        black_box(reconstruct(&Input::from(&buffers), method, ALPHA));
+        black_box(reconstruct(&problem(&buffers, method), method, ALPHA));
         println!("{}", (memory(peak_memory())? - before) / (pixels * 3.0 * size_of::<[f32; 3]>() as f64));
     }
     Ok(())

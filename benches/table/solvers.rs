@@ -1,8 +1,8 @@
 //! The solves at 1920×1080: time on all threads and memory.
 
 use super::{Effort, process};
-use gdpt::reconstruct::{Input, reconstruct};
-use gdpt_bench::fixtures::noisy_buffers;
+use gdpt::reconstruct::reconstruct;
+use gdpt_bench::fixtures::{noisy_buffers, problem};
 use gdpt_bench::kernels::{ALPHA, SOLVERS};
 use gdpt_bench::measure::{Rounds, Side, cost};
 use gdpt_bench::render::{cpus, pool};
@@ -23,7 +23,7 @@ pub fn rows(effort: &Effort) -> Vec<Row> {
     let buffers = noisy_buffers(width as usize, height as usize);
     let pool = pool(cpus());
     let sides = SOLVERS.map(|(_, method)| -> Side<'_> {
-        let (input, pool) = (Input::from(&buffers), &pool);
+        let (input, pool) = (problem(&buffers, method), &pool);
         Box::new(move || pool.install(|| cost(|| reconstruct(&input, method, ALPHA))))
     });
     let rounds = Rounds::alternate(effort.rounds, sides.into());

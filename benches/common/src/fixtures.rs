@@ -3,6 +3,7 @@
 use gdpt::accel::Hits;
 use gdpt::film::{Buffers, Measured, PixelSample, Plane};
 use gdpt::math::{Frame, LANES, Mask, Vec3x, f32x16, lanes, splat};
+use gdpt::reconstruct::{Input, Method};
 use gdpt::scene::{Environment, Instance, Material, Mesh, Scene, Texture, TextureRef, Wrap};
 use gdpt::shade::{Bsdf, Surface};
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec3A, Vec4};
@@ -141,6 +142,11 @@ pub fn noisy_buffers(width: usize, height: usize) -> Buffers {
     };
     let all = Measured { primal: mean(|m| &m.primal), dx: mean(|m| &m.dx), dy: mean(|m| &m.dy) };
     Buffers { all, halves: Some(halves), direct: Plane::new(width, height), features: None }
+}
+
+/// What `method` needs of the buffers, and no more: halves cost two more solves, which estimate the error.
+pub fn problem(buffers: &Buffers, method: Method) -> Input<'_> {
+    if method == Method::Weighted { Input::from(buffers) } else { Input::new(&buffers.all) }
 }
 
 /// A sample with all its parts.
