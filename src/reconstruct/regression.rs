@@ -95,8 +95,8 @@ impl Tile {
                 let from = pixel(x, y);
                 let weight = from.map_or(0.0, |i| guide.weights[i]);
                 self.weight[to] = weight;
-                for j in 0..FEATURES {
-                    let relative = from.map_or(0.0, |i| guide.features[i][j] - median[j]);
+                for (j, median) in median.iter().enumerate() {
+                    let relative = from.map_or(0.0, |i| guide.features[i][j] - median);
                     let feature = relative.clamp(-REACH, REACH);
                     self.features[j][to] = feature;
                     self.weighted[j][to] = weight * feature;
@@ -214,8 +214,8 @@ fn solve(sum: impl Fn(usize) -> f32x16) -> [f32x16; COEFFICIENTS - 1] {
             if i == j {
                 v = v.max(zero) + splat(RIDGE);
             }
-            for k in 0..j {
-                v -= l[i][k] * l[j][k];
+            for (a, b) in l[i].iter().zip(&l[j]).take(j) {
+                v -= *a * *b;
             }
             l[i][j] = if i == j {
                 v.simd_gt(least).select(splat(1.0) / v.max(least).sqrt(), zero)
