@@ -264,7 +264,7 @@ fn image_layers_metadata_and_statistics_are_those_of_the_contract() {
     assert!(image.channels["spp.Y"].iter().all(|v| *v == 8.0));
     assert!(image.world_to_camera.is_some() && image.world_to_ndc.is_some());
     let attribute = |name: &str| image.attributes.get(name).map(String::as_str);
-    for (name, value) in [("seed", "5"), ("spp", "8"), ("samples", "0..8"), ("norm", "guided")] {
+    for (name, value) in [("seed", "5"), ("spp", "8"), ("samples", "0..8"), ("norm", "weighted")] {
         assert_eq!(attribute(&format!("gdpt/{name}")), Some(value));
     }
     for name in ["version", "scene", "integrator", "max_depth", "residual"] {

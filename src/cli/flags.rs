@@ -46,7 +46,7 @@ pub enum MethodFlag {
     L2,
     /// Least squares, each measurement weighed by its noise
     Weighted,
-    /// The weighted image, single bad pixels mended by what the first hits tell: the least error
+    /// The weighted image, single bad pixels mended by what the first hits tell: often the least error, the most bias
     Guided,
     /// The one with the least estimated error
     Auto,
@@ -179,7 +179,7 @@ pub struct RenderFlags {
     /// Pixel filter
     #[arg(long, value_name = "FILTER", default_value = "box")]
     filter: FilterFlag,
-    /// How the image is found from samples and gradients [default: guided; none with --integrator pt]
+    /// How the image is found from samples and gradients [default: weighted; none with --integrator pt]
     #[arg(long, value_name = "NORM")]
     reconstruct: Option<MethodFlag>,
     /// Weight of the samples against the gradients, for l1 and l2: a number, or auto for that of the measured noise

@@ -67,10 +67,10 @@ pub enum Method {
     /// Sum of squares: linear, hence unbiased; exact by cosine transform.
     L2,
     /// Sum of squares, each row weighed by its measured noise. Without halves: [`Method::L1`].
+    #[default]
     Weighted,
     /// The weighted image, single pixels mended after their neighbours as far as their noise asks for it: consistent.
     /// Without features: [`Method::Weighted`].
-    #[default]
     Guided,
     /// The one of the above with the least estimated error. Without halves: [`Method::L1`].
     Auto,
