@@ -16,7 +16,7 @@ use crate::accel::{Accel, EmbreeAccel, ObvhsAccel};
 use crate::denoise;
 use crate::error::{Error, Result};
 use crate::film::{Buffers, Film, Half, Plane};
-use crate::integrate::{self, Settings, Statistics};
+use crate::integrate::{self, Settings, ShadeScene, Statistics};
 use crate::reconstruct::{Alpha, Input, Method, Solution, reconstruct};
 use crate::scene::{Camera, LoadReport, Scene};
 use crate::store::{Document, Window, atomic, exr, layers, png};
@@ -197,13 +197,14 @@ impl Work<'_> {
         build: impl FnOnce() -> Result<A>,
     ) -> Result<(Film, Statistics)> {
         self.monitor.stage("build");
-        let (accel, time) = timed(build);
-        let accel = accel?;
+        let (built, time) =
+            timed(|| build().map(|accel| (accel, self.pool.install(|| ShadeScene::new(scene)))));
+        let (accel, scene) = built?;
         seconds.build = time;
         self.go_on()?;
 
         let (settings, stop) = (&self.job.settings, &self.job.stop);
-        let mut renderer = Renderer { work: self, scene, accel: &accel, camera };
+        let mut renderer = Renderer { work: self, scene: &scene, accel: &accel, camera };
         let (result, time) = timed(|| passes::run(settings, stop, self.start, &mut renderer));
         seconds.render = time;
         self.go_on()?;
@@ -214,7 +215,7 @@ impl Work<'_> {
 /// A scene before one backend.
 struct Renderer<'a, A> {
     work: &'a Work<'a>,
-    scene: &'a Scene,
+    scene: &'a ShadeScene<'a>,
     accel: &'a A,
     camera: &'a Camera,
 }

@@ -2,11 +2,13 @@
 #![cfg(unix)]
 
 mod process;
+#[path = "process/signal.rs"]
+mod signal;
 
 use assert_cmd::cargo::cargo_bin;
 use process::{assert_no_hidden_files, assert_refused, folder, stderr};
+use signal::signalled;
 use std::fs;
-use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Command, Stdio};
 
@@ -37,25 +39,8 @@ fn signals_end_it_and_write_nothing() {
         let folder = folder();
         let path = folder.path();
         fs::write(path.join("old.exr"), b"old").expect("writable");
-        let mut child = Command::new(cargo_bin!("gdpt"))
-            .current_dir(path)
-            .args(["render", "builtin:cornell-box", "-o", "old.exr", "--spp", "10000000"])
-            .args(["--progress", "json"])
-            .stderr(Stdio::piped())
-            .stdout(Stdio::null())
-            .spawn()
-            .expect("the program starts");
-        let mut lines = BufReader::new(child.stderr.take().expect("piped"));
-        let mut line = String::new();
-        while !line.contains("\"render\"") {
-            line.clear();
-            assert!(lines.read_line(&mut line).expect("text") > 0, "it ended before it rendered");
-        }
-        let kill = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).status();
-        assert!(kill.expect("kill is there").success());
-        let mut rest = String::new();
-        lines.read_to_string(&mut rest).expect("text");
-        let ended = child.wait().expect("it ends");
+        let arguments = ["render", "builtin:cornell-box", "-o", "old.exr", "--spp", "10000000"];
+        let (ended, rest) = signalled(path, &arguments, "\"render\"", signal);
         assert_eq!((ended.code(), ended.signal()), (Some(status), None), "{rest}");
         assert!(rest.contains("gdpt: error: interrupted"), "{rest}");
         assert_eq!(fs::read(path.join("old.exr")).expect("still there"), b"old");

@@ -11,7 +11,7 @@ use crate::stats::{Estimate, block_means, largest, sidak_threshold, worst, z_sco
 use exr::prelude::*;
 use gdpt::accel::EmbreeAccel;
 use gdpt::film::Half;
-use gdpt::integrate::{self, Kind, Settings};
+use gdpt::integrate::{self, Kind, Settings, ShadeScene};
 use gdpt::scene::{self, Environment};
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -97,11 +97,12 @@ fn render(name: &str, reference: &Reference) -> Vec<Vec<[f32; 3]>> {
         seed,
         ..Settings::default()
     };
+    let prepared = ShadeScene::new(&scene);
     (0..RUNS)
         .map(|seed| {
             let never = AtomicBool::new(false);
             let (film, _) =
-                integrate::run(&scene, &accel, &scene.cameras[0], &settings(seed), &|_, _| (), &never);
+                integrate::run(&prepared, &accel, &scene.cameras[0], &settings(seed), &|_, _| (), &never);
             assert_eq!(film.dropped_samples, 0, "{name}: samples that are not finite");
             let (primal, direct) = (film.primal(Half::Both).data, film.direct().data);
             primal.iter().zip(&direct).map(|(p, d)| std::array::from_fn(|c| p[c] + d[c])).collect()

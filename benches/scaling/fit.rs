@@ -1,5 +1,7 @@
 //! Power laws: y = factor · x^exponent by least squares on logarithms.
 
+use gdpt::study::fit::slope;
+
 /// A fitted power law.
 #[derive(Clone, Copy, Debug)]
 pub struct Fit {
@@ -25,12 +27,8 @@ pub fn upper_half(points: &[(f64, f64)]) -> Option<Fit> {
     let upper: Vec<_> = points.iter().filter(|(x, _)| *x >= middle).copied().collect();
     // Two points of a short range, rather than one.
     let chosen = if upper.len() < 2 { points } else { &upper };
-    let logs = || chosen.iter().map(|(x, y)| (x.ln(), y.ln()));
-    let n = chosen.len() as f64;
-    let mean = logs().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x / n, sum.1 + y / n));
-    let (xx, xy) = logs()
-        .fold((0.0, 0.0), |sum, (x, y)| (sum.0 + (x - mean.0).powi(2), sum.1 + (x - mean.0) * (y - mean.1)));
-    let exponent = xy / xx;
-    let range = [chosen.first()?.0, high];
-    (xx > 0.0).then(|| Fit { exponent, factor: (mean.1 - exponent * mean.0).exp(), range })
+    let exponent = slope(chosen);
+    let offset = |(x, y): &(f64, f64)| y.ln() - exponent * x.ln();
+    let factor = (chosen.iter().map(offset).sum::<f64>() / chosen.len() as f64).exp();
+    exponent.is_finite().then_some(Fit { exponent, factor, range: [chosen.first()?.0, high] })
 }

@@ -3,9 +3,10 @@
 use super::Effort;
 use gdpt::film::Film;
 use gdpt::reconstruct::reconstruct;
+use gdpt::study::usage::{peak_memory, resident_memory};
 use gdpt_bench::fixtures::{noisy_buffers, problem};
 use gdpt_bench::kernels::{ALPHA, SOLVERS};
-use gdpt_bench::measure::{median, peak_memory, resident_memory};
+use gdpt_bench::measure::median;
 use gdpt_bench::scenes::{self, BenchScene};
 use gdpt_bench::table::{Row, Target};
 use std::hint::black_box;

@@ -20,16 +20,8 @@
 
 use crate::integrate::ShiftOutcome;
 use crate::render::{Job, Report, metadata};
-use crate::study::clock::cpu_seconds;
+use crate::study::usage::{cpu_seconds, peak_memory};
 use serde_json::{Map, Value, json};
-
-/// Most memory this process ever held, bytes.
-fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib * 1024)
-}
 
 /// The number that was typed, not the nearest f32 written out in f64.
 fn decimal(value: f32) -> Value {

@@ -20,16 +20,15 @@ use crate::shade::Surface;
 /// The gradient-domain path tracer.
 pub struct GradientPath;
 
-/// The offsets' first vertices: lane permutations of block and ring.
-fn first_offsets(block: &Block, region: &Region, primary: &Primary, ring: &Primary) -> [Offset; 4] {
-    let hit = [primary.hits.valid, ring.hits.valid];
-    Direction::ALL.map(|direction| {
-        let from = neighbours(direction);
-        let exists = block.has_neighbour(direction, region) & block.inside;
-        let met = Mask::from_fn(|i| hit[from[i] / 16].get(from[i] % 16));
+/// The offsets' first vertices: lane permutations of block and ring. `picks` and `exists`: where each direction's
+/// neighbours are found, and in which lanes there is one.
+fn first_offsets(picks: &[Pick; 4], exists: &[Mask; 4], primary: &Primary, ring: &Primary) -> [Offset; 4] {
+    std::array::from_fn(|d| {
+        let (pick, exists) = (picks[d], exists[d]);
+        let met = Mask::permute(&primary.hits.valid, &ring.hits.valid, pick);
         let own = exists & met & primary.hits.valid;
         Offset {
-            surface: <Surface as Permute>::permute(&primary.surface, &ring.surface, Pick::new(from)),
+            surface: Surface::permute(&primary.surface, &ring.surface, pick),
             wo: Vec3x::ZERO,
             beta: own.keep(Rgb::grey(1.0)),
             ratio: own.keep(splat(1.0)),
@@ -72,8 +71,11 @@ impl Integrator for GradientPath {
         statistics: &mut Statistics,
     ) {
         let Scratch { slots, samples, factors, queues } = scratch.reset(region, &wave);
+        let picks = Direction::ALL.map(|direction| Pick::new(neighbours(direction)));
         for block in Block::of_region(region, view.settings) {
             let ring_inside = block.ring_inside(region);
+            let exists =
+                Direction::ALL.map(|direction| block.has_neighbour(direction, region) & block.inside);
             for index in wave.clone() {
                 let primary = block.primary(view, tracer, index);
                 let lanes = block.slots(region, index - wave.start);
@@ -83,7 +85,7 @@ impl Integrator for GradientPath {
                     continue;
                 }
                 let ring = block.ring(view, tracer, index, ring_inside);
-                let offsets = first_offsets(&block, region, &primary, &ring);
+                let offsets = first_offsets(&picks, &exists, &primary, &ring);
                 let mut head = Head {
                     surface: primary.surface,
                     beta: Rgb::grey(1.0),

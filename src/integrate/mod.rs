@@ -10,6 +10,7 @@ mod head;
 mod path;
 mod wave;
 
+pub use crate::shade::ShadeScene;
 pub use gradient_path::GradientPath;
 pub use path::Path;
 pub use wave::{Region, Scratch, TILE};
@@ -18,8 +19,7 @@ use crate::accel::Accel;
 use crate::film::{Film, FilmTile};
 use crate::path::Limits;
 use crate::path::trace::{RayCounts, Tracer};
-use crate::scene::{Camera, Scene};
-use crate::shade::ShadeScene;
+use crate::scene::Camera;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -190,10 +190,11 @@ pub struct View<'a> {
     pub limits: Limits,
 }
 
-/// Renders `scene` through `camera` on the threads of the current rayon pool. Calls `on_progress` with (done, total)
-/// work items; stops early, with what is complete, once `cancel` is set.
+/// Renders `scene`, which is prepared once for any number of renders, through `camera` on the threads of the current
+/// rayon pool. Calls `on_progress` with (done, total) work items; stops early, with what is complete, once `cancel` is
+/// set.
 pub fn run<A: Accel>(
-    scene: &Scene,
+    scene: &ShadeScene,
     accel: &A,
     camera: &Camera,
     settings: &Settings,
@@ -210,14 +211,13 @@ pub fn run<A: Accel>(
 
 fn tiles<I: Integrator, A: Accel>(
     integrator: &I,
-    scene: &Scene,
+    scene: &ShadeScene,
     accel: &A,
     view: &View<'_>,
     on_progress: &(dyn Fn(u64, u64) + Sync),
     cancel: &AtomicBool,
 ) -> (Film, Statistics) {
     let settings = view.settings;
-    let prepared = ShadeScene::new(scene);
     let [x0, y0, x1, y1] = settings.crop.unwrap_or([0, 0, settings.width, settings.height]);
     let regions = Region::tiles(x0, y0, x1, y1);
     let total = regions.len() as u64;
@@ -237,7 +237,7 @@ fn tiles<I: Integrator, A: Accel>(
                 }
                 let mut tile = region.film_tile(x0, y0);
                 let mut statistics = Statistics::default();
-                let mut tracer = Tracer::new(&prepared, accel);
+                let mut tracer = Tracer::new(scene, accel);
                 for wave in wave::waves(settings.first_sample, settings.spp) {
                     if cancel.load(Ordering::Relaxed) {
                         return None;

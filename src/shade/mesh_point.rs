@@ -20,6 +20,14 @@ impl<'a> MeshPoint<'a> {
         Self { mesh, triangle: mesh.triangles[primitive as usize], weights: Vec3::new(1.0 - u - v, u, v) }
     }
 
+    /// What lane `lane` met.
+    #[inline(always)]
+    pub(super) fn of_hit(scene: &'a ShadeScene, hits: &Hits, lane: usize) -> Self {
+        let instance = &scene.scene.instances[hits.instance[lane] as usize];
+        let mesh = &scene.scene.meshes[instance.mesh as usize];
+        Self::new(mesh, hits.primitive[lane], hits.u.as_array()[lane], hits.v.as_array()[lane])
+    }
+
     #[inline(always)]
     pub(super) fn interpolate<T>(&self, values: &[T]) -> T
     where
@@ -80,12 +88,8 @@ impl super::texture::Decoder {
 /// opaque materials); 0 in lanes that are not active or hit nothing.
 pub fn alpha(scene: &ShadeScene, hits: &Hits, active: Mask) -> f32x16 {
     let mut coverage = [0.0; LANES];
-    let (u, v) = (hits.u.as_array(), hits.v.as_array());
     for lane in (active & hits.valid).iter() {
-        let instance = &scene.scene.instances[hits.instance[lane] as usize];
-        let mesh = &scene.scene.meshes[instance.mesh as usize];
-        let at = MeshPoint::new(mesh, hits.primitive[lane], u[lane], v[lane]);
-        coverage[lane] = scene.decoder.coverage(scene.scene, &at);
+        coverage[lane] = scene.decoder.coverage(scene.scene, &MeshPoint::of_hit(scene, hits, lane));
     }
     f32x16::new(coverage)
 }

@@ -172,14 +172,20 @@ fn apply_base_textures(
     uv: [f32x16; 2],
     material: &mut [f32x16; LANES],
 ) {
+    if lanes.none() {
+        return;
+    }
     let [u, v] = uv.map(f32x16::to_array);
     // First all reads, none of which waits for another: the texels are rarely in the nearest cache.
     let mut footprints = [Footprint::default(); LANES];
     for lane in lanes.iter() {
         let place = &scene.records.places[hits.instance[lane] as usize];
         let Some(t) = &scene.scene.materials[place.material].base_color_texture else { continue };
-        let uv =
-            if t.uv_set == 0 { Vec2::new(u[lane], v[lane]) } else { mesh_point(scene, hits, lane).uv()[1] };
+        let uv = if t.uv_set == 0 {
+            Vec2::new(u[lane], v[lane])
+        } else {
+            MeshPoint::of_hit(scene, hits, lane).uv()[1]
+        };
         let texture = &scene.scene.textures[t.texture as usize];
         footprints[lane] = Footprint::new(texture, t.transform.transform_point2(uv));
     }
@@ -199,14 +205,15 @@ fn apply_textures(
     uv: [f32x16; 2],
     material: &mut [f32x16; LANES],
 ) {
+    if lanes.none() {
+        return;
+    }
     let [u, v] = uv.map(f32x16::to_array);
     let mut columns = material.map(f32x16::to_array);
     for lane in lanes.iter() {
-        let instance = &scene.scene.instances[hits.instance[lane] as usize];
-        let mesh = &scene.scene.meshes[instance.mesh as usize];
-        let m = &scene.scene.materials[mesh.material as usize];
-        let at = || mesh_point(scene, hits, lane);
-        let second = if mesh.uvs[1].is_some() { at().uv()[1] } else { Vec2::ZERO };
+        let at = MeshPoint::of_hit(scene, hits, lane);
+        let m = &scene.scene.materials[at.mesh.material as usize];
+        let second = if at.mesh.uvs[1].is_some() { at.uv()[1] } else { Vec2::ZERO };
         let uv = [Vec2::new(u[lane], v[lane]), second];
         let mut multiply = |from: usize, factors: &[f32]| {
             for (column, factor) in columns[from..].iter_mut().zip(factors) {
@@ -214,8 +221,8 @@ fn apply_textures(
             }
         };
         let texel = |t: &Option<TextureRef>| t.as_ref().map(|t| scene.decoder.lookup_ref(scene.scene, t, uv));
-        if mesh.colors.is_some() {
-            multiply(0, &at().color().truncate().to_array());
+        if at.mesh.colors.is_some() {
+            multiply(0, &at.color().truncate().to_array());
         }
         if let Some(t) = texel(&m.metallic_roughness_texture) {
             multiply(3, &[t.z, t.y]);
@@ -233,14 +240,6 @@ fn apply_textures(
     *material = columns.map(f32x16::new);
 }
 
-/// The point of the mesh that lane `lane` met.
-#[inline(always)]
-fn mesh_point<'a>(scene: &'a ShadeScene, hits: &Hits, lane: usize) -> MeshPoint<'a> {
-    let instance = &scene.scene.instances[hits.instance[lane] as usize];
-    let mesh = &scene.scene.meshes[instance.mesh as usize];
-    MeshPoint::new(mesh, hits.primitive[lane], hits.u.as_array()[lane], hits.v.as_array()[lane])
-}
-
 /// Normal maps with the tangents they lie in.
 #[derive(Default)]
 struct NormalMap {
@@ -254,7 +253,7 @@ impl NormalMap {
         let mut map = Self::default();
         for lane in lanes.iter() {
             let index = hits.instance[lane] as usize;
-            let at = mesh_point(scene, hits, lane);
+            let at = MeshPoint::of_hit(scene, hits, lane);
             let material = &scene.scene.materials[at.mesh.material as usize];
             let (Some(texture), Some(tangents)) = (&material.normal_texture, &at.mesh.tangents) else {
                 continue;
@@ -285,7 +284,7 @@ impl NormalMap {
 fn emission(scene: &ShadeScene, hits: &Hits, emitters: Mask, base: Rgb) -> Rgb {
     let mut radiance = Column3::default();
     for lane in emitters.iter() {
-        let at = mesh_point(scene, hits, lane);
+        let at = MeshPoint::of_hit(scene, hits, lane);
         let material = &scene.scene.materials[at.mesh.material as usize];
         if material.unlit {
             radiance.set(lane, base.lane(lane));
@@ -308,13 +307,11 @@ impl Surface {
         let p = vector(&g.geometry, 0) + e1 * hits.u + e2 * hits.v;
         let ng = (e1.cross(e2) * g.geometry[HANDEDNESS]).normalize();
         let weights = [splat(1.0) - hits.u - hits.v, hits.u, hits.v];
-        let base_textured = g.has(flag::BASE_TEXTURED);
-        if base_textured.any() {
-            apply_base_textures(scene, hits, base_textured, g.uv(weights), &mut g.material);
-        }
-        let textured = g.has(flag::TEXTURED);
-        if textured.any() {
-            apply_textures(scene, hits, textured, g.uv(weights), &mut g.material);
+        let (base_textured, textured) = (g.has(flag::BASE_TEXTURED), g.has(flag::TEXTURED));
+        if (base_textured | textured).any() {
+            let uv = g.uv(weights);
+            apply_base_textures(scene, hits, base_textured, uv, &mut g.material);
+            apply_textures(scene, hits, textured, uv, &mut g.material);
         }
         let mapped = g.has(flag::MAPPED);
         let map = mapped.any().then(|| NormalMap::new(scene, hits, mapped));

@@ -1,13 +1,13 @@
 //! One scene on the bench: renders with their CPU time, solves, and the reference that all is held against.
 
-use super::clock;
+use super::usage;
 use super::{Plan, Subject};
 use crate::accel::{Accel, EmbreeAccel};
 use crate::analyze::flip;
 use crate::analyze::metrics::{self, Comparison};
 use crate::error::{Error, Result};
 use crate::film::{Film, Half, Plane};
-use crate::integrate::{self, Kind, Settings};
+use crate::integrate::{self, Kind, Settings, ShadeScene};
 use crate::reconstruct::{Alpha, Input, Method, reconstruct};
 use crate::render::{Monitor, open, sum};
 use crate::scene::{Camera, Environment, LoadOptions, Scene};
@@ -68,11 +68,25 @@ pub struct Score {
     pub energy: f64,
 }
 
-/// A loaded scene with its acceleration structure.
+/// The scene of a subject.
+pub fn load(subject: &Subject, monitor: &dyn Monitor) -> Result<Scene> {
+    monitor.stage(&format!("{}: load", subject.name()));
+    let mut scene = open(&subject.source, &LoadOptions::default())?;
+    if let Some(path) = &subject.environment {
+        let report = &mut scene.report;
+        scene.environment = Some(Environment::load_reporting(path, 1.0, 0.0, true, report)?);
+    }
+    for warning in &scene.report.warnings {
+        monitor.warn(warning);
+    }
+    Ok(scene)
+}
+
+/// A scene prepared for any number of renders.
 pub struct Bench<'a> {
     pub plan: &'a Plan,
     pub name: String,
-    pub scene: Scene,
+    scene: ShadeScene<'a>,
     accel: EmbreeAccel,
     camera: Camera,
     monitor: &'a dyn Monitor,
@@ -80,30 +94,22 @@ pub struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    /// Loads and builds.
+    /// Builds what the loaded `scene` of `subject` needs.
     pub fn new(
         plan: &'a Plan,
         subject: &Subject,
+        scene: &'a Scene,
         monitor: &'a dyn Monitor,
         cancel: &'a AtomicBool,
     ) -> Result<Self> {
         let name = subject.name();
-        monitor.stage(&format!("{name}: load"));
-        let mut scene = open(&subject.source, &LoadOptions::default())?;
-        if let Some(path) = &subject.environment {
-            let report = &mut scene.report;
-            scene.environment = Some(Environment::load_reporting(path, 1.0, 0.0, true, report)?);
-        }
-        for warning in &scene.report.warnings {
-            monitor.warn(warning);
-        }
         let camera = scene.cameras.first().cloned().ok_or_else(|| Error::Scene {
             path: subject.source.path(),
             at: String::new(),
             what: "has no camera and nothing to fit one to".into(),
         })?;
-        let accel = EmbreeAccel::new(&scene, plan.threads, false, None)?;
-        Ok(Self { plan, name, scene, accel, camera, monitor, cancel })
+        let accel = EmbreeAccel::new(scene, plan.threads, false, None)?;
+        Ok(Self { plan, name, scene: ShadeScene::new(scene), accel, camera, monitor, cancel })
     }
 
     /// Says what begins.
@@ -113,7 +119,7 @@ impl<'a> Bench<'a> {
 
     /// A film and the CPU seconds it took.
     pub fn film(&self, settings: &Settings) -> Result<(Film, f64)> {
-        let ((film, _), seconds) = clock::timed(|| self.integrate(settings, &self.accel));
+        let ((film, _), seconds) = usage::timed(|| self.integrate(settings, &self.accel));
         if self.cancel.load(Ordering::Relaxed) { Err(Error::Interrupted(0)) } else { Ok((film, seconds)) }
     }
 
@@ -210,7 +216,7 @@ fn automatic_exposure(image: &Plane) -> f32 {
 
 /// The image of a film of gradients that took `render_seconds`.
 pub fn solve(film: &Film, method: Method, render_seconds: f64) -> Shot {
-    let (solution, solve_seconds) = clock::timed(|| {
+    let (solution, solve_seconds) = usage::timed(|| {
         let buffers = film.buffers();
         reconstruct(&Input::from(&buffers), method, Alpha::Fixed(ALPHA))
     });

@@ -1,8 +1,8 @@
 //! The measurement of one scene: every method at every number of samples, and what pictures need beside that.
 
-use super::bench::{Bench, Reference, Score, Shot, solve};
+use super::bench::{self, Bench, Reference, Score, Shot, solve};
 use super::fit;
-use super::{Plan, Subject, clock};
+use super::{Plan, Subject, usage};
 use crate::analyze::noise::Noise;
 use crate::denoise;
 use crate::error::Result;
@@ -145,7 +145,8 @@ pub fn measure(
     monitor: &dyn Monitor,
     cancel: &AtomicBool,
 ) -> Result<Findings> {
-    let bench = Bench::new(plan, subject, monitor, cancel)?;
+    let scene = bench::load(subject, monitor)?;
+    let bench = Bench::new(plan, subject, &scene, monitor, cancel)?;
     let reference = bench.reference()?;
     let mut tallies = Vec::new();
     for round in 0..u64::from(plan.rounds) {
@@ -163,7 +164,7 @@ pub fn measure(
     let pair_weights = pair_weights(&bench)?;
     Ok(Findings {
         name: bench.name.clone(),
-        triangles: bench.scene.triangle_count(),
+        triangles: scene.triangle_count(),
         reference,
         cells,
         noise,
@@ -217,7 +218,7 @@ fn top_spp(plan: &Plan) -> u32 {
 fn denoised(bench: &Bench, spp: u32, seed: u64) -> Result<Shot> {
     let settings = Settings { features: true, ..bench.settings(Kind::Path, spp, seed) };
     let (film, render_seconds) = bench.film(&settings)?;
-    let (image, solve_seconds) = clock::timed(|| denoise::primal(&film));
+    let (image, solve_seconds) = usage::timed(|| denoise::primal(&film));
     let (image, direct) = (image?, film.direct());
     Ok(Shot { image, direct, render_seconds, solve_seconds, estimate: f64::NAN })
 }

@@ -14,8 +14,7 @@
 
 mod bench;
 pub mod charts;
-pub mod clock;
-mod fit;
+pub mod fit;
 pub mod folder;
 pub mod inspect;
 mod ladder;
@@ -23,6 +22,7 @@ mod page;
 mod pictures;
 mod report;
 pub mod table;
+pub mod usage;
 
 use crate::error::Result;
 use crate::reconstruct::Method;

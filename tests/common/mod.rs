@@ -6,7 +6,7 @@ pub mod shapes;
 
 use gdpt::accel::{Accel, EmbreeAccel};
 use gdpt::film::{Film, Half, Plane};
-use gdpt::integrate::{Kind, Settings, Statistics, run};
+use gdpt::integrate::{Kind, Settings, ShadeScene, Statistics, run};
 use scenes::TestScene;
 use std::sync::atomic::AtomicBool;
 
@@ -25,7 +25,8 @@ pub fn settings(scene: &TestScene, kind: Kind, seed: u64, spp: u32) -> Settings 
 /// Renders; no sample may be dropped.
 pub fn render<A: Accel>(scene: &TestScene, accel: &A, settings: &Settings) -> (Film, Statistics) {
     let never = AtomicBool::new(false);
-    let (film, statistics) = run(&scene.scene, accel, &scene.camera, settings, &|_, _| (), &never);
+    let prepared = ShadeScene::new(&scene.scene);
+    let (film, statistics) = run(&prepared, accel, &scene.camera, settings, &|_, _| (), &never);
     assert_eq!(film.dropped_samples, 0, "{}: samples that are not finite", scene.name);
     (film, statistics)
 }

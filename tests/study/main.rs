@@ -3,8 +3,11 @@
 
 mod browser;
 mod report;
+#[path = "../process/signal.rs"]
+mod signal;
 
 use assert_cmd::cargo::cargo_bin;
+use signal::signalled;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -99,31 +102,14 @@ fn what_cannot_be_studied_is_refused_before_any_work() {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_study_leaves_nothing() {
-    use std::io::{BufRead, BufReader, Read};
     let folder = tempfile::tempdir().expect("a private folder");
     let path = folder.path();
     fs::create_dir(path.join("report")).expect("writable");
     fs::write(path.join("report/index.html"), "old").expect("writable");
     for (output, left) in [("report", vec!["report"]), ("new", vec!["report"])] {
-        let mut child = Command::new(cargo_bin!("gdpt"))
-            .current_dir(path)
-            .args(["study", "builtin:cornell-box", "--reference-spp", "10000000", "--progress", "json"])
-            .args(["-o", output])
-            .stderr(Stdio::piped())
-            .stdout(Stdio::null())
-            .spawn()
-            .expect("the program starts");
-        let mut lines = BufReader::new(child.stderr.take().expect("piped"));
-        let mut line = String::new();
-        while !line.contains("reference") {
-            line.clear();
-            assert!(lines.read_line(&mut line).expect("text") > 0, "it ended before it rendered");
-        }
-        let kill = Command::new("kill").arg("-INT").arg(child.id().to_string()).status();
-        assert!(kill.expect("kill is there").success());
-        let mut rest = String::new();
-        lines.read_to_string(&mut rest).expect("text");
-        assert_eq!(child.wait().expect("it ends").code(), Some(130), "{rest}");
+        let arguments = ["study", "builtin:cornell-box", "--reference-spp", "10000000", "-o", output];
+        let (ended, rest) = signalled(path, &arguments, "reference", "INT");
+        assert_eq!(ended.code(), Some(130), "{rest}");
         assert_eq!(names(path), left);
         assert_eq!(names(&path.join("report")), ["index.html"]);
         assert_eq!(fs::read(path.join("report/index.html")).expect("still there"), b"old");

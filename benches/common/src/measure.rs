@@ -1,7 +1,7 @@
 //! Measuring on machines that others use too: sides take turns within one run, and what counts is the median over the
 //! rounds of the ratio within a round.
 
-use rustix::time::{ClockId, clock_gettime};
+use gdpt::study::usage::cpu_seconds;
 use std::time::Instant;
 
 /// What a piece of work took, s.
@@ -23,11 +23,6 @@ impl Cost {
     pub fn wall(self) -> f64 {
         self.wall
     }
-}
-
-fn cpu_seconds() -> f64 {
-    let time = clock_gettime(ClockId::ProcessCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 /// The result of `work` and what it took.
@@ -81,26 +76,10 @@ impl Rounds {
     }
 }
 
-/// Most memory this process ever held, bytes. Not `ru_maxrss`, which a process inherits from the one that started it.
-pub fn peak_memory() -> Option<u64> {
-    status_bytes("VmHWM:")
-}
-
-/// Memory this process holds, bytes.
-pub fn resident_memory() -> Option<u64> {
-    status_bytes("VmRSS:")
-}
-
-fn status_bytes(field: &str) -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix(field))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib * 1024)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gdpt::study::usage::{peak_memory, resident_memory};
     use std::cell::RefCell;
 
     #[test]

@@ -4,7 +4,7 @@ use crate::measure::{Cost, Side, cost};
 use gdpt::accel::embree::flush_denormals;
 use gdpt::accel::{Accel, EmbreeAccel, ObvhsAccel};
 use gdpt::film::Film;
-use gdpt::integrate::{self, Kind, Settings, Statistics};
+use gdpt::integrate::{self, Kind, Settings, ShadeScene, Statistics};
 use gdpt::scene::Scene;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::AtomicBool;
@@ -30,7 +30,14 @@ pub fn settings(kind: Kind, [width, height]: [u32; 2], spp: u32, seed: u64) -> S
 
 /// Renders through the first camera on the threads of the current pool.
 pub fn render<A: Accel>(scene: &Scene, accel: &A, settings: &Settings) -> (Film, Statistics) {
-    integrate::run(scene, accel, &scene.cameras[0], settings, &|_, _| {}, &AtomicBool::new(false))
+    integrate::run(
+        &ShadeScene::new(scene),
+        accel,
+        &scene.cameras[0],
+        settings,
+        &|_, _| {},
+        &AtomicBool::new(false),
+    )
 }
 
 /// A scene built for both backends.
